@@ -15,6 +15,11 @@ namespace {
 
 using namespace calibrate;
 
+constexpr const char* kSpinAlone =
+    "A spin gives the axis but neither the tip nor which way it points; add a recording with the "
+    "tip "
+    "on a fixed point.";
+
 struct AxisPoint {
     Vector3 at;
     Matrix3 weight;  // inverse covariance
@@ -324,9 +329,54 @@ NeedleFit fit_needle_spin(std::span<const Pose> readings) {
                  "groove.",
                  s2 / kRadPerDeg));
     }
-    out.warnings.push_back(
-        "A spin gives the axis but neither the tip nor which way it points; add a recording "
-        "with the tip on a fixed point.");
+    out.warnings.push_back(kSpinAlone);
+    return out;
+}
+
+NeedleFit join_pivot_and_spin(const PointFit& pivot, const NeedleFit& spin) {
+    NeedleFit out = spin;
+    out.warnings = pivot.warnings;
+    for (const std::string& warning : spin.warnings) {
+        if (warning != kSpinAlone) out.warnings.push_back(warning);
+    }
+    out.points = {pivot};
+    out.poses = pivot.poses + spin.poses;
+    out.inliers = pivot.inliers + spin.inliers;
+    out.rms_mm = pivot.rms_mm;
+    out.tip_mm = pivot.tip_mm;
+    out.tip_sigma_mm = pivot.sigma_mm;
+    out.tip_measured = true;
+    out.determined = false;
+    if (!pivot.determined) {
+        out.problem = "the pivot has no answer: " + pivot.problem;
+        return out;
+    }
+    if (!spin.determined) {
+        out.problem = "the spin has no answer: " + spin.problem;
+        return out;
+    }
+    const double along = dot(pivot.tip_mm, spin.direction);
+    if (along < 0) out.direction = -out.direction;
+    const double sigma = std::max({pivot.sigma_mm.x, pivot.sigma_mm.y, pivot.sigma_mm.z});
+    if (!(std::abs(along) > std::max(5.0, 3 * sigma))) {
+        out.problem = text(
+            "the tip lies only %.1f mm from the sensor along the needle, so that its sign is not "
+            "known; use pinholes at several depths",
+            std::abs(along));
+        return out;
+    }
+    out.axis_point_mm = pivot.tip_mm - along * spin.direction;
+    out.paper_direction = out.direction;
+    out.paper_point_mm = out.axis_point_mm;
+    out.determined = true;
+    const double off = norm(cross(pivot.tip_mm - spin.axis_point_mm, spin.direction));
+    const double across = std::hypot(sigma, std::abs(along) * spin.direction_sigma_rad);
+    if (off > std::max(1.0, 3 * across)) {
+        out.warnings.push_back(
+            text("The tip lies %.1f mm beside the axis that the spin found; the needle is bent, or "
+                 "the sensor slipped between the two: record both again.",
+                 off));
+    }
     return out;
 }
 

@@ -8,6 +8,8 @@
 //            reported. The answer weights each point by its own covariance, which equals the joint
 //            fit of all readings.
 // Spin       The needle is spun in a groove: the axis is the direction that does not turn.
+// Both       One pivot with the tip itself on a fixed point, and one spin: tip by the pivot, axis
+//            by the spin, from the sensor to the tip.
 #pragma once
 
 #include <span>
@@ -54,6 +56,10 @@ NeedleFit fit_needle(std::span<const std::vector<Pose>> recordings,
 // Fits a spin, which determines the axis but neither the tip (tip_mm is axis_point_mm) nor the sign
 // of the direction. Never fails.
 NeedleFit fit_needle_spin(std::span<const Pose> poses);
+
+// Joins a pivot of the tip with a spin. Not determined if either is not, or if the tip is so near
+// to the sensor along the axis that the sign is not known; a warning if the tip lies off the axis.
+NeedleFit join_pivot_and_spin(const PointFit& pivot, const NeedleFit& spin);
 
 struct NeedleAgreement {
     double angle_rad = 0;    // between the directions

@@ -124,8 +124,8 @@ constexpr MetricInfo kTable[] = {
     {"needle_bounding_box_mm3", "needle", "Bounding box of the path of the tip", kLess, "",
      kHoldStill},
 
-    {"needle_in_beam_fraction", "guidance", "Share of the inserted needle that is visible", kMore,
-     kSites, kWholeShaft},
+    {"needle_in_beam_fraction", "guidance", "Share of the needle in the sector that is visible",
+     kMore, kSites, kWholeShaft},
     {"needle_in_beam_mm", "guidance", "Visible inserted length, mean", kMore, "", kWholeShaft},
     {"tip_in_view_fraction", "guidance", "Share of the time in tissue with the tip visible", kMore,
      kSites, kTipBright},

@@ -30,14 +30,19 @@ Result<TextureFile> load_texture_file(const std::string& path);
 Status save_surface_file(const SurfaceFile& file, const std::string& path);
 Result<SurfaceFile> load_surface_file(const std::string& path);
 
-// Recordings: tracked poses, IGSIO sequences and the logs of other trainers.
+// Recordings: tracked poses, IGSIO sequences and the logs of other trainers. A sequence may keep
+// its pixels in another file of the same folder (.mhd with .raw).
 Result<std::vector<Pose>> load_poses(const std::string& path);
 Result<Sequence> load_sequence(const std::string& path);
 // NRRD if `path` ends in .nrrd, MetaImage otherwise.
 Status save_sequence(const Sequence& sequence, const std::string& path, bool compress = false);
 
-// Reads IGSIO sequences and PerkTutor's transform logs (XML).
-Result<Sequence> load_recording_file(const std::string& path);
+// The one reader of everything that is a list of readings: IGSIO sequences, PerkTutor's transform
+// logs (XML) and tables of poses (formats/recording/poses.h), recognised by what they hold. A table
+// has one transform, NeedleToTracker if its file's name says needle or stylus, else ProbeToTracker.
+// "PROBE_FILE,NEEDLE_FILE" joins the probe of one with the needle of the other, each its file's
+// only transform or the one with the tool's name; frames of equal times become one.
+Result<Sequence> load_recording_file(const std::string& files);
 
 // Calibrations (formats/calibration/calibration.h).
 Result<Calibration> load_calibration(const std::string& path);

@@ -15,14 +15,14 @@
 namespace sonocase {
 namespace {
 
-constexpr int kVersion = 2;               // 2: seed
+constexpr int kVersion = 3;               // 2: seed; 3: attempts of one second stand side by side
 constexpr int kApplication = 0x534F4E4F;  // "SONO"
 
-constexpr const char* kSchema =
-    "CREATE TABLE session(id INTEGER PRIMARY KEY, trainee TEXT NOT NULL, case_name TEXT NOT NULL,"
+constexpr const char* kSessionColumns =
+    "(id INTEGER PRIMARY KEY, trainee TEXT NOT NULL, case_name TEXT NOT NULL,"
     " exercise TEXT NOT NULL, started TEXT NOT NULL, recording TEXT NOT NULL, passed INTEGER NOT "
-    "NULL, seed INTEGER NOT NULL DEFAULT 0,"
-    " UNIQUE(trainee, exercise, started));"
+    "NULL, seed INTEGER NOT NULL DEFAULT 0);";
+constexpr const char* kScoreTable =
     "CREATE TABLE score(session INTEGER NOT NULL REFERENCES session(id) ON DELETE CASCADE,"
     " metric TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY(session, metric)) WITHOUT ROWID;";
 
@@ -115,7 +115,8 @@ Result<ProgressBook> ProgressBook::open(const std::string& path) {
     const std::int64_t tables = impl->pragma("SELECT count(*) FROM sqlite_master");
     if (tables < 0) return impl->fault("is not a progress book");
     if (tables == 0 && version == 0) {
-        const std::string make = std::string("BEGIN IMMEDIATE;") + kSchema +
+        const std::string make = std::string("BEGIN IMMEDIATE; CREATE TABLE session") +
+                                 kSessionColumns + kScoreTable +
                                  "PRAGMA application_id=" + std::to_string(kApplication) +
                                  ";PRAGMA user_version=" + std::to_string(kVersion) + ";COMMIT;";
         if (!impl->run(make.c_str())) {
@@ -130,10 +131,21 @@ Result<ProgressBook> ProgressBook::open(const std::string& path) {
         return Error{"comes from a newer program (version " + std::to_string(version) + ")", path,
                      "update this one"};
     } else if (version < kVersion) {
-        if (!impl->run(
-                "BEGIN IMMEDIATE; ALTER TABLE session ADD COLUMN seed INTEGER NOT NULL DEFAULT 0;"
-                "PRAGMA user_version=2; COMMIT;")) {
-            impl->run("ROLLBACK");
+        // SQLite cannot take a constraint out of a table: it is copied into one without. Scores go
+        // on naming it, as foreign keys are off meanwhile.
+        const std::string copy =
+            "PRAGMA foreign_keys=OFF; BEGIN IMMEDIATE; CREATE TABLE fresh" +
+            std::string(kSessionColumns) +
+            "INSERT INTO fresh SELECT id, trainee, case_name, exercise, started, recording, "
+            "passed," +
+            (version < 2 ? " 0" : " seed") +
+            " FROM session; DROP TABLE session; ALTER TABLE fresh RENAME TO session;"
+            "PRAGMA user_version=" +
+            std::to_string(kVersion) + "; COMMIT;";
+        const bool copied = impl->run(copy.c_str());
+        if (!copied) impl->run("ROLLBACK");
+        impl->run("PRAGMA foreign_keys=ON");
+        if (!copied) {
             // Another program may have done it at the same moment.
             if (impl->pragma("PRAGMA user_version") != kVersion)
                 return impl->fault("cannot bring the book to this version");
@@ -151,11 +163,12 @@ Status ProgressBook::add(const ProgressEntry& entry) {
         return error;
     };
     {
-        Statement old(impl.db, "DELETE FROM session WHERE trainee=? AND exercise=? AND started=?");
-        if (old.bind(1, entry.trainee).bind(2, entry.exercise).bind(3, entry.started).step() !=
-            SQLITE_DONE) {
+        Statement old(impl.db,
+                      "DELETE FROM session WHERE trainee=? AND case_name=? AND exercise=? AND"
+                      " started=? AND recording=? AND recording<>''");
+        old.bind(1, entry.trainee).bind(2, entry.case_name).bind(3, entry.exercise);
+        if (old.bind(4, entry.started).bind(5, entry.recording).step() != SQLITE_DONE)
             return give_up();
-        }
         Statement row(
             impl.db,
             "INSERT INTO session(trainee, case_name, exercise, started, recording, passed, seed)"

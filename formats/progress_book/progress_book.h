@@ -28,8 +28,8 @@ struct ProgressEntry {
 
 class ProgressBook {
   public:
-    // Creates the file and its folder if they are missing. A book of version 1 is brought to
-    // version 2; its sessions get the seed 0. An Error for a file that is not a progress book or
+    // Creates the file and its folder if they are missing. A book of an older version is
+    // brought to version 3; sessions of version 1 get the seed 0. An Error for a file that is not a progress book or
     // was written by a newer program.
     static Result<ProgressBook> open(const std::string& path);
     ~ProgressBook();
@@ -37,7 +37,8 @@ class ProgressBook {
     ProgressBook& operator=(ProgressBook&&) noexcept;
 
     // One transaction: after a crash the session is stored with all its scores or not at all. A
-    // session with the same trainee, exercise and start is replaced.
+    // session of the same trainee, case, exercise, start and recording is replaced; without a
+    // recording every session is one of its own.
     Status add(const ProgressEntry& entry);
     // Oldest first. Empty names match all.
     Result<std::vector<ProgressEntry>> sessions(const std::string& trainee,

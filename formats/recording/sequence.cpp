@@ -94,10 +94,12 @@ bool HeaderLines::next_text(std::string_view& line) {
     const auto* from = reinterpret_cast<const char*>(bytes_.data()) + at_;
     const std::string_view rest(from, bytes_.size() - at_);
     const std::size_t end = rest.find('\n');
-    if (end == std::string_view::npos) return false;  // cut off: every header line has an end
+    // Cut off: every header line has an end, but for the last one of a file without pixels.
+    if (end == std::string_view::npos && (nrrd_ || !rest.starts_with("ElementDataFile")))
+        return false;
     line = rest.substr(0, end);
     if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
-    at_ += end + 1;
+    at_ = end == std::string_view::npos ? bytes_.size() : at_ + end + 1;
     ++number_;
     return true;
 }
@@ -122,8 +124,10 @@ HeaderLines::Next HeaderLines::next(HeaderLine& entry) {
 // Recognises the form by the first bytes. An error when a line is neither a comment nor a key with
 // a value, when a key is longer than 512 bytes, when the header does not end, and when a MetaImage
 // keeps its pixels in another file.
-Result<SequenceHeader> split_sequence_header(std::span<const std::uint8_t> bytes,
-                                             const std::string& where) {
+Result<SequenceHeader> split_sequence_header(
+    std::span<const std::uint8_t> bytes,
+    const std::string& where,
+    std::optional<std::span<const std::uint8_t>> data = {}) {
     static constexpr std::string_view kNrrd = "NRRD000";
     SequenceHeader header;
     header.bytes = bytes;
@@ -133,7 +137,7 @@ Result<SequenceHeader> split_sequence_header(std::span<const std::uint8_t> bytes
     for (HeaderLine entry;;) {
         switch (lines.next(entry)) {
             case HeaderLines::Next::line: break;
-            case HeaderLines::Next::data: header.data = lines.rest(); return header;
+            case HeaderLines::Next::data: header.data = data ? *data : lines.rest(); return header;
             case HeaderLines::Next::cut_off:
                 return sequence_fault(where, "ends inside its header",
                                       header.nrrd
@@ -147,9 +151,11 @@ Result<SequenceHeader> split_sequence_header(std::span<const std::uint8_t> bytes
                            : sequence_fault(where, "holds no 'key = value'",
                                             "is it a sequence (.igs.mha)?", lines.number());
         }
-        if (!header.nrrd && entry.key == "ElementDataFile" && entry.value != "LOCAL")
+        if (!header.nrrd && entry.key == "ElementDataFile" && entry.value != "LOCAL" && !data)
             return sequence_fault(where, "keeps its pixels in another file",
-                                  "expected ElementDataFile = LOCAL", lines.number());
+                                  "expected ElementDataFile = LOCAL, or the name of a file in the "
+                                  "same folder that is there",
+                                  lines.number());
         if (is_frame_key(entry.key)) {
             ++header.frame_lines;
         } else {
@@ -228,6 +234,7 @@ Status read_sequence_pixels(std::span<const std::uint8_t> data,
 }
 
 constexpr std::size_t kMaxTransforms = 256;
+const SequencePose kAbsent{.absent = true};
 constexpr double kMaxPixelBytes = 64.0 * (1u << 30);
 
 // Reads the lines of a header into a Sequence; the first fault ends it.
@@ -259,6 +266,8 @@ class Reader {
     std::vector<double> sizes_;
     bool channels_first_ = false;
     bool binary_ = true;
+    bool without_pixels_ = false;              // images of 0 x 0
+    bool numbered_ = false, stamped_ = false;  // a frame has its number; its time
     PixelCoding coding_;
     std::vector<bool> seen_;                                 // frames with at least one line
     std::map<std::string, std::size_t, std::less<>> slots_;  // transform -> index of its poses
@@ -418,6 +427,8 @@ Status Reader::check_shape() {
     }
     if (!binary_) return fault("keeps its pixels as text", "expected binary data");
     const bool volume = sizes_.size() == 4;
+    without_pixels_ = sizes_[0] == 0 && sizes_[1] == 0;
+    if (without_pixels_) std::fill(sizes_.begin(), sizes_.end() - 1, 1.0);
     for (std::size_t i = 0; i + 1 < sizes_.size(); ++i) {
         if (sizes_[i] < 1 || sizes_[i] > 65536)
             return fault("has an impossible image size", "expected 1 to 65536");
@@ -492,15 +503,20 @@ Status Reader::read_frame_field(const HeaderLine& line, std::size_t index, std::
         if (slot >= kMaxTransforms) return fault("has too many transforms", "", line.number);
         if (frame.poses.capacity() <= slot)
             frame.poses.reserve(std::max(slot + 1, out_.transforms.size()));
-        while (frame.poses.size() <= slot) frame.poses.emplace_back();
+        while (frame.poses.size() <= slot) frame.poses.push_back(kAbsent);
         SequencePose& pose = frame.poses[slot];
+        pose.absent = false;
         return is_status ? read_transform_status(line, pose) : read_transform(line, pose);
     }
-    if (name == "Timestamp") return read_number(line, frame.timestamp_s);
+    if (name == "Timestamp") {
+        stamped_ = true;
+        return read_number(line, frame.timestamp_s);
+    }
     if (name == "UnfilteredTimestamp") return read_number(line, frame.unfiltered_timestamp_s);
     if (name == "FrameNumber") {
         double n = 0;
         SONOCASE_TRY_DONE(read_number(line, n));
+        numbered_ = true;
         frame.number = std::abs(n) < 9e15 ? static_cast<std::int64_t>(n) : 0;
         return Done{};
     }
@@ -546,7 +562,9 @@ Status Reader::read_frames() {
         if (!seen_[i])
             return fault("frame " + std::to_string(i) + " has no fields", "make the file again");
         SequenceFrame& frame = out_.frames[i];
-        frame.poses.resize(out_.transforms.size());
+        frame.poses.resize(out_.transforms.size(), kAbsent);
+        if (!numbered_) frame.number = static_cast<std::int64_t>(i);
+        if (!stamped_) frame.timestamp_s = frame.unfiltered_timestamp_s;
         for (SequencePose& pose : frame.poses) {
             if (!pose.ok && pose.to_from[15] == kRefused) pose.to_from[15] = 1;
         }
@@ -557,15 +575,31 @@ Status Reader::read_frames() {
 Result<Sequence> Reader::read() {
     SONOCASE_TRY_DONE(read_structure());
     SONOCASE_TRY_DONE(read_frames());
-    SONOCASE_TRY_DONE(read_sequence_pixels(header_.data, coding_, where_, out_));
+    if (!without_pixels_)
+        SONOCASE_TRY_DONE(read_sequence_pixels(header_.data, coding_, where_, out_));
     return std::move(out_);
 }
 
 }  // namespace
 
-Result<Sequence> read_sequence(std::span<const std::uint8_t> bytes, const std::string& where) {
-    SONOCASE_TRY(const auto header, split_sequence_header(bytes, where));
+Result<Sequence> read_sequence(std::span<const std::uint8_t> bytes,
+                               const std::string& where,
+                               std::optional<std::span<const std::uint8_t>> data) {
+    SONOCASE_TRY(const auto header, split_sequence_header(bytes, where, data));
     return Reader(header, where).read();
+}
+
+std::string pixel_file_of(std::span<const std::uint8_t> bytes) {
+    HeaderLines lines(bytes, false);
+    for (HeaderLine line; lines.next(line) == HeaderLines::Next::line;) {
+        if (line.key != "ElementDataFile") continue;
+        // A name in the same folder, and nothing else.
+        if (line.value == "LOCAL" || line.value.find_first_of("/\\%") != std::string_view::npos ||
+            line.value.starts_with("."))
+            return {};
+        return std::string(line.value);
+    }
+    return {};
 }
 
 namespace {
@@ -620,6 +654,34 @@ int Sequence::transform_index(std::string_view name) const {
         if (transforms[i] == name) return static_cast<int>(i);
     }
     return -1;
+}
+
+void join_frames(Sequence& sequence) {
+    std::vector<SequenceFrame>& frames = sequence.frames;
+    const auto before = [](const SequenceFrame& a, const SequenceFrame& b) {
+        const bool no_a = std::isnan(a.timestamp_s), no_b = std::isnan(b.timestamp_s);
+        return no_a || no_b ? !no_a && no_b : a.timestamp_s < b.timestamp_s;
+    };
+    std::stable_sort(frames.begin(), frames.end(), before);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+        SequenceFrame& from = frames[i];
+        bool joined = kept > 0 && frames[kept - 1].timestamp_s == from.timestamp_s;
+        for (std::size_t t = 0; joined && t < from.poses.size(); ++t)
+            joined = from.poses[t].absent || frames[kept - 1].poses[t].absent;
+        if (!joined) {
+            if (kept != i) frames[kept] = std::move(from);
+            ++kept;
+            continue;
+        }
+        SequenceFrame& to = frames[kept - 1];
+        for (std::size_t t = 0; t < from.poses.size(); ++t) {
+            if (!from.poses[t].absent) to.poses[t] = from.poses[t];
+        }
+        to.fields.insert(to.fields.end(), from.fields.begin(), from.fields.end());
+    }
+    frames.resize(kept);
+    for (std::size_t i = 0; i < kept; ++i) frames[i].number = static_cast<std::int64_t>(i);
 }
 
 std::optional<Rigid> rigid_from_matrix(const std::array<double, 16>& m) {

@@ -23,6 +23,7 @@ namespace sonocase {
 struct SequencePose {
     bool ok = false;  // status OK and a matrix given
     std::array<double, 16> to_from{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};  // row by row
+    bool absent = false;  // the frame says nothing about this transform: it is another tool's
 };
 
 struct SequenceField {
@@ -54,14 +55,24 @@ struct Sequence {
     int transform_index(std::string_view name) const;  // -1: none
 };
 
+// Sorts frames by time and joins those of one time that speak of different transforms, as logs that
+// write tools one by one need it. Frames without a time come last.
+void join_frames(Sequence& sequence);
+
 // The rigid motion if the matrix is one (within 1e-3); empty for scales, mirrors and NaN.
 std::optional<Rigid> rigid_from_matrix(const std::array<double, 16>& to_from);
 std::array<double, 16> matrix_from_rigid(const Rigid& to_from);
 
 // Reads either form, recognised by its first bytes; zlib-compressed pixels are unpacked. Frames
 // that the header describes beyond its stated size are dropped: they occur in a recording that was
-// cut off while it grew.
-Result<Sequence> read_sequence(std::span<const std::uint8_t> bytes, const std::string& where);
+// cut off while it grew. Images of 0 x 0, as 3D Slicer writes transforms, are none. Frames without
+// FrameNumber are numbered from 0. data: the pixels of a header that names another file for them.
+Result<Sequence> read_sequence(std::span<const std::uint8_t> bytes,
+                               const std::string& where,
+                               std::optional<std::span<const std::uint8_t>> data = {});
+// The file that a MetaImage header names for its pixels ("pivot.raw"); empty: they follow it, or
+// these bytes are no such header.
+std::string pixel_file_of(std::span<const std::uint8_t> bytes);
 
 enum class SequenceForm { mha, nrrd };
 std::vector<std::uint8_t> write_sequence(const Sequence& sequence,

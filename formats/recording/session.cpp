@@ -17,6 +17,9 @@ constexpr const char* kEventField = "Event";
 constexpr const char* kSettingsField = "Settings";
 constexpr const char* kPressField = "Press";
 constexpr const char* kDopplerField = "Doppler";
+constexpr const char* kProbeAgeField = "ProbeAge";
+constexpr const char* kNeedleAgeField = "NeedleAge";
+constexpr double kHeldS = 0.02;  // a pose this old was not measured for its frame
 
 struct HeaderField {
     const char* name;
@@ -133,6 +136,11 @@ std::string doppler_text(const DopplerSample& doppler) {
     return text + " beats=" + std::to_string(doppler.beats);
 }
 
+void read_age(const std::string& text, double& to) {
+    double read = 0;
+    if (parse_number(text, read) && read >= 0 && read < 3600) to = read;
+}
+
 // The rotation of the needle's own frame that makes its axis z.
 Rigid z_along(Vector3 axis) {
     const Vector3 z = normalized(axis);
@@ -224,6 +232,8 @@ Result<Session> session_from_sequence(const Sequence& sequence,
             if (field.name == kPressField) sample.has_press = read_press(field.value, sample.press);
             if (field.name == kDopplerField)
                 sample.has_doppler = read_doppler(field.value, sample.doppler);
+            if (field.name == kProbeAgeField) read_age(field.value, sample.probe_age_s);
+            if (field.name == kNeedleAgeField) read_age(field.value, sample.needle_age_s);
             if (field.name == kEventField) read_events(field.value, sample, session.events);
         }
         session.samples.push_back(std::move(sample));
@@ -240,6 +250,10 @@ SequenceFrame frame_from_sample(const SessionSample& sample,
     frame.poses = {{sample.probe_ok, matrix_from_rigid(sample.mannequin_from_probe)},
                    {sample.needle_ok, matrix_from_rigid(sample.mannequin_from_needle)},
                    {sample.needle_ok, matrix_from_rigid(sample.mannequin_from_drawn)}};
+    if (sample.probe_ok && sample.probe_age_s > kHeldS)
+        frame.fields.push_back({kProbeAgeField, number_text(sample.probe_age_s, 4)});
+    if (sample.needle_ok && sample.needle_age_s > kHeldS)
+        frame.fields.push_back({kNeedleAgeField, number_text(sample.needle_age_s, 4)});
     if (!sample.settings.empty()) frame.fields.push_back({kSettingsField, sample.settings});
     if (sample.has_press) frame.fields.push_back({kPressField, press_text(sample.press)});
     if (sample.has_doppler) frame.fields.push_back({kDopplerField, doppler_text(sample.doppler)});

@@ -61,6 +61,8 @@ struct SessionSample {
     bool needle_ok = false;
     Rigid mannequin_from_needle;  // as measured: origin at the tip, z from hub to tip
     Rigid mannequin_from_drawn;   // as shown, after the bend constraint
+    // How long before time_s the tracker measured the pose that was shown.
+    double probe_age_s = 0, needle_age_s = 0;
     // Console settings that changed at this frame, as "key=value" words; empty: unchanged.
     std::string settings;
     bool has_press = false;  // false in older recordings and in those of other programs

@@ -2,6 +2,10 @@
 
 #include "formats/recording/transform_log.h"
 
+#include <algorithm>
+#include <utility>
+#include <vector>
+
 #include "formats/recording/session.h"
 #include "formats/text/number_text.h"
 
@@ -43,6 +47,7 @@ bool looks_like_transform_log(std::string_view text) {
 
 Result<Sequence> parse_transform_log(std::string_view xml, const std::string& where) {
     Sequence sequence;
+    std::vector<std::pair<double, std::string>> messages;
     std::size_t at = 0;
     int count = 0;
     while ((at = xml.find("<log ", at)) != std::string_view::npos) {
@@ -59,10 +64,8 @@ Result<Sequence> parse_transform_log(std::string_view xml, const std::string& wh
             return Error{"has no time", here, "expected TimeStampSec and TimeStampNSec"};
         }
         if (attribute(element, "type") == "message") {
-            if (!sequence.frames.empty()) {
-                sequence.frames.back().fields.push_back(
-                    {"Event", "message|text=" + std::string(attribute(element, "message"))});
-            }
+            messages.push_back(
+                {seconds + 1e-9 * nanoseconds, std::string(attribute(element, "message"))});
             continue;
         }
         SequencePose pose;
@@ -82,13 +85,25 @@ Result<Sequence> parse_transform_log(std::string_view xml, const std::string& wh
         frame.number = static_cast<std::int64_t>(sequence.frames.size());
         frame.timestamp_s = seconds + 1e-9 * nanoseconds;
         frame.unfiltered_timestamp_s = frame.timestamp_s;
-        frame.poses.resize(index + 1);
+        frame.poses.resize(index + 1, {.absent = true});
         frame.poses[index] = pose;
         sequence.frames.push_back(std::move(frame));
     }
-    for (SequenceFrame& frame : sequence.frames) frame.poses.resize(sequence.transforms.size());
+    for (SequenceFrame& frame : sequence.frames)
+        frame.poses.resize(sequence.transforms.size(), {.absent = true});
     if (sequence.frames.empty())
         return Error{"holds no readings", where, "expected a transform log"};
+    join_frames(sequence);
+    for (const auto& [time_s, text] : messages) {
+        // In the last frame at or before it, with its own time.
+        auto frame = std::upper_bound(
+            sequence.frames.begin(), sequence.frames.end(), time_s,
+            [](double time, const SequenceFrame& f) { return time < f.timestamp_s; });
+        if (frame != sequence.frames.begin()) --frame;
+        std::string detail = "message|text=" + text;
+        if (frame->timestamp_s != time_s) detail += " t=" + number_text(time_s);
+        frame->fields.push_back({"Event", detail});
+    }
     return sequence;
 }
 

@@ -15,8 +15,9 @@ namespace sonocase {
 
 bool looks_like_transform_log(std::string_view text);
 
-// Makes one frame per reading. All other tools are INVALID in that frame: no pose is invented.
-// Messages become the field "Event" of the frame before them.
+// Makes one frame per time, of the readings that bear it, in whatever order the log has them. All
+// other tools are absent in that frame: no pose is invented. Messages become the field "Event" of
+// the frame at or before their own time, which they keep.
 Result<Sequence> parse_transform_log(std::string_view xml, const std::string& where);
 
 }  // namespace sonocase

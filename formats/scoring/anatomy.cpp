@@ -5,19 +5,30 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/base/portable_math.h"
 #include "formats/volume/boundary_record.h"
 
 namespace sonocase {
+namespace {
+
+// Fluid takes the harmonics of a steep pulse, dB/cm/MHz (docs/effects.md).
+constexpr double kFluidLoss = 0.22;
+
+}  // namespace
 
 CaseAnatomy::CaseAnatomy(CaseView bundle, const BreathingMotion& breathing)
     : bundle_(bundle), breathing_(breathing) {
     if (breathing.amplitude_mm != 0) field_ = BreathingField(*bundle);
     const std::vector<int> tissues = tissue_of_label(*bundle);
-    for (std::size_t i = 0; i < tissues.size() && i < blocks_sound_.size(); ++i) {
+    acoustics_[0] = {0, 0};
+    for (std::size_t i = 1; i < tissues.size() && i < acoustics_.size(); ++i) {
         const auto t = static_cast<std::size_t>(tissues[i]);
         if (tissues[i] < 0 || t >= bundle->tissues.size()) continue;
-        const TissueKind kind = bundle->tissues[t].kind;
-        blocks_sound_[i] = kind == TissueKind::bone || kind == TissueKind::gas;
+        const Tissue& tissue = bundle->tissues[t];
+        acoustics_[i] = {tissue.attenuation_db_cm_mhz,
+                         exponential(0.11512925464970229 * tissue.echo_db),
+                         tissue.kind == TissueKind::bone, tissue.kind == TissueKind::gas};
+        if (tissue.kind == TissueKind::fluid) acoustics_[i].loss_db_cm_mhz += kFluidLoss;
     }
 }
 

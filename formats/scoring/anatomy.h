@@ -36,6 +36,16 @@ class Anatomy {
     // True if labels say where sound passes, so that blocks_sound() and shadows are defined.
     virtual bool knows_tissue() const { return false; }
     virtual bool blocks_sound(int /*label*/) const { return false; }  // bone or gas
+    // What sound loses in the tissue of a label, one way, dB/cm/MHz, as pictures show it; and the
+    // amplitude of its echo relative to a homogeneous liver.
+    struct Acoustics {
+        double loss_db_cm_mhz = 0.5, echo = 1;
+        bool bone = false, gas = false;
+    };
+    virtual Acoustics acoustics(int label) const {
+        if (label == 0) return {0, 0};
+        return blocks_sound(label) ? Acoustics{20, 1, true} : Acoustics{};
+    }
     // True where the volume cuts the body off: a surface there is not skin.
     virtual bool at_edge(Point3 /*p*/) const { return false; }
 };
@@ -54,11 +64,14 @@ class CaseAnatomy final : public Anatomy {
     Point3 moved(Point3 rest, double time_s) const override;
     double greatest_shift_mm() const override { return std::abs(breathing_.amplitude_mm); }
     bool knows_tissue() const override { return true; }
-    bool blocks_sound(int label) const override { return blocks_sound_[label]; }
+    bool blocks_sound(int label) const override {
+        return acoustics_[label].bone || acoustics_[label].gas;
+    }
+    Acoustics acoustics(int label) const override { return acoustics_[label]; }
     bool at_edge(Point3 p) const override;
 
   private:
-    std::array<bool, 256> blocks_sound_{};
+    std::array<Acoustics, 256> acoustics_{};
     CaseView bundle_;
     BreathingMotion breathing_;
     BreathingField field_;  // empty: at rest

@@ -23,7 +23,7 @@ struct LookUp {
     const Exercise& exercise;
     const Anatomy* anatomy;
     const ScoreOptions& options;
-    double half_slab_mm = 0;
+    NeedleSight sight{anatomy, exercise};
     std::vector<bool> no_go = std::vector<bool>(256, false);  // # labels
     bool has_no_go = false;
 
@@ -38,26 +38,21 @@ struct LookUp {
             const Rigid probe_from_mannequin = inverse(sample.mannequin_from_probe);
             const Point3 t = probe_from_mannequin * tip;
             r.plane_mm = t.y;
-            r.tip_in_view = std::abs(t.y) <= half_slab_mm && in_image(exercise.probe, t.x, t.z);
-            if (anatomy) read_along_beams(sample, point.time_s, t, direction, &r);
+            read_in_picture(sample.mannequin_from_probe, point.time_s, t,
+                            probe_from_mannequin * direction, &r);
         }
         return r;
     }
 
-    // Sets which part of the needle sound reaches.
-    void read_along_beams(const SessionSample& sample,
-                          double time_s,
-                          Point3 tip_probe,
-                          Vector3 direction,
-                          NeedleReading* r) const {
-        const Rigid& pose = sample.mannequin_from_probe;
-        r->tip_in_view =
-            r->tip_in_view && sound_reaches(*anatomy, exercise.probe, pose, tip_probe, time_s);
+    // axis: of the needle, `probe` frame.
+    void read_in_picture(
+        const Rigid& pose, double time_s, Point3 tip, Vector3 axis, NeedleReading* r) const {
+        r->tip_in_view = sight.tip_visible(pose, tip, axis, time_s);
+        r->on_the_way = sight.on_the_way(tip, axis);
         if (!(r->depth_mm > 0)) return;
-        const Vector3 back = transpose(pose.rotation) * direction;
-        const Point3 skin = tip_probe - r->depth_mm * back;
-        r->in_beam_mm =
-            visible_length(*anatomy, exercise.probe, pose, tip_probe, skin, half_slab_mm, time_s);
+        const Point3 skin = tip - r->depth_mm * axis;
+        r->in_beam_mm = sight.visible_mm(pose, tip, skin, time_s);
+        r->in_sector_mm = sight.in_sector_mm(tip, skin);
     }
 
     void read_in_body(const TrackPoint& point,
@@ -87,9 +82,6 @@ std::vector<NeedleReading> look_up_readings(const Session& session,
                                             const std::vector<Label>& labels,
                                             const ScoreOptions& options) {
     LookUp look_up{session, exercise, anatomy, options};
-    const double slab =
-        exercise.needle.slab_mm > 0 ? exercise.needle.slab_mm : needle_diameter_mm(exercise.needle);
-    look_up.half_slab_mm = 0.5 * std::max(slab, exercise.probe.elevation_mm);
     for (std::size_t i = 0; i < labels.size() && i < look_up.no_go.size(); ++i) {
         const bool spared = std::find(exercise.no_go.begin(), exercise.no_go.end(),
                                       labels[i].name) != exercise.no_go.end();
@@ -362,14 +354,14 @@ void score_targets_scanned(const ScoreInput& input,
 
 void score_guidance(const ScoreInput& input, MetricValues& values) {
     if (!input.anatomy || input.probe.points.empty()) return;
-    double in_beam = 0, inserted = 0, seconds = 0, view_s = 0, plane = 0, plane_max = 0, angle = 0;
+    double in_beam = 0, in_sector = 0, seconds = 0, view_s = 0, plane = 0, plane_max = 0, angle = 0;
     double advance = 0, advance_in_view = 0;
     for (std::size_t i = 1; i < input.readings.size(); ++i) {
         const NeedleReading& r = input.readings[i];
         if (!r.inside || !r.seen) continue;
         const double dt = input.step_s(i);
         in_beam += dt * r.in_beam_mm;
-        inserted += dt * r.depth_mm;
+        in_sector += dt * r.in_sector_mm;
         seconds += dt;
         if (r.tip_in_view) view_s += dt;
         plane += dt * std::abs(r.plane_mm);
@@ -380,11 +372,11 @@ void score_guidance(const ScoreInput& input, MetricValues& values) {
         angle += dt * kDegPerRad * arc_tangent(sine, std::sqrt((1 - sine) * (1 + sine)));
         const double forward =
             std::max(dot(input.tip(i) - input.tip(i - 1), input.direction(i)), 0.0);
-        advance += forward;
+        if (!r.on_the_way) advance += forward;
         if (r.tip_in_view) advance_in_view += forward;
     }
     if (!(seconds > 0)) return;
-    if (inserted > 0) values["needle_in_beam_fraction"] = in_beam / inserted;
+    if (in_sector > 0) values["needle_in_beam_fraction"] = in_beam / in_sector;
     values["needle_in_beam_mm"] = in_beam / seconds;
     values["tip_in_view_fraction"] = view_s / seconds;
     if (advance > 0) values["tip_in_view_at_advance_fraction"] = advance_in_view / advance;

@@ -23,8 +23,10 @@ struct NeedleReading {
     Point3 skin;           // where the shaft passes it
     bool seen = false;     // the probe is tracked in the same sample
     double plane_mm = std::numeric_limits<double>::quiet_NaN();  // signed, of the tip
-    bool tip_in_view = false;  // in the image and reached by sound
-    double in_beam_mm = 0;     // inserted length in the image that sound reaches
+    bool tip_in_view = false;                                    // NeedleSight::tip_visible
+    bool on_the_way = false;                                     // NeedleSight::on_the_way
+    double in_beam_mm = 0;                                       // inserted length that is visible
+    double in_sector_mm = 0;  // inserted length beside the plane or in it, inside the sector
 };
 
 // One per point of the needle. anatomy may be null: then nothing is inside. The readings are

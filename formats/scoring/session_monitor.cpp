@@ -26,12 +26,6 @@ std::string word(std::string text) {
     return text;
 }
 
-double half_slab_mm(const Exercise& exercise) {
-    const double slab =
-        exercise.needle.slab_mm > 0 ? exercise.needle.slab_mm : needle_diameter_mm(exercise.needle);
-    return 0.5 * std::max(slab, exercise.probe.elevation_mm);
-}
-
 }  // namespace
 
 SessionEvent session_event(const LiveEvent& event,
@@ -92,6 +86,7 @@ SessionMonitor::SessionMonitor(const Exercise& exercise,
                                const ScoreOptions& options)
     : exercise_(&exercise),
       anatomy_(anatomy),
+      sight_(anatomy, exercise),
       options_(options),
       detector_(options.insertion),
       is_no_go_(256, false),
@@ -214,11 +209,10 @@ std::span<const LiveEvent> SessionMonitor::update(double time_s,
     }
     tip_in_view_ = false;
     if (probe_ok && needle_ok) {
-        const Point3 p = inverse(mannequin_from_probe) * tip;
+        const Rigid probe_from = inverse(mannequin_from_probe);
         tip_in_view_ =
-            std::abs(p.y) <= half_slab_mm(*exercise_) && in_image(exercise_->probe, p.x, p.z) &&
-            (!anatomy_ ||
-             sound_reaches(*anatomy_, exercise_->probe, mannequin_from_probe, p, time_s));
+            sight_.tip_visible(mannequin_from_probe, probe_from * tip,
+                               probe_from * mannequin_from_drawn.rotation.column(2), time_s);
     }
     if (anatomy_ && needle_ok) watch_needle(time_s, mannequin_from_drawn);
     watch_targets(time_s, probe_ok, mannequin_from_probe, needle_ok, tip);

@@ -14,6 +14,7 @@
 #include "formats/scoring/anatomy.h"
 #include "formats/scoring/insertion_detector.h"
 #include "formats/scoring/session_score.h"
+#include "formats/scoring/sight.h"
 
 namespace sonocase {
 
@@ -94,6 +95,7 @@ class SessionMonitor {
 
     const Exercise* exercise_;
     const Anatomy* anatomy_;
+    NeedleSight sight_;
     ScoreOptions options_;
     InsertionDetector detector_;
     std::vector<bool> is_no_go_;

@@ -9,6 +9,7 @@
 
 #include "formats/exercise/metric_table.h"
 #include "formats/scoring/score_parts.h"
+#include "formats/scoring/sight.h"
 #include "formats/text/json_reader.h"
 
 namespace sonocase {
@@ -47,7 +48,8 @@ SessionCurves curves_of(const ScoreInput& input) {
         c.time_s.push_back(input.time(i));
         c.depth_mm.push_back(input.anatomy ? std::max(r.depth_mm, 0.0) : kNan);
         c.plane_distance_mm.push_back(r.plane_mm);
-        c.in_beam_fraction.push_back(r.seen && r.depth_mm > 0 ? r.in_beam_mm / r.depth_mm : kNan);
+        c.in_beam_fraction.push_back(r.seen && r.in_sector_mm > 0 ? r.in_beam_mm / r.in_sector_mm
+                                                                  : kNan);
         double nearest = kNan;
         // With many targets the curve of the nearest one says little and is expensive.
         if (input.exercise.targets.size() <= 64) {
@@ -132,6 +134,7 @@ std::string score_json(const SessionScore& score, const Exercise& exercise) {
     using detail::json_of;
     Json out = Json::object();
     out["exercise"] = exercise.name;
+    out["sight_rule"] = kSightRule;
     Json metrics = Json::object();
     for (const Metric& metric : score.metrics) metrics[metric.name] = json_number(metric.value);
     out["metrics"] = std::move(metrics);

@@ -88,7 +88,7 @@ BreathingMotion breathing_shown(const Exercise& exercise,
                                 const std::vector<std::string>& effects);
 BreathingMotion breathing_shown(const Exercise& exercise, const SessionHeader& header);
 
-// Stable JSON: {"metrics": {name: value or null}, "passed", "pass_marks": [...], "insertions":
+// Stable JSON: {"sight_rule": kSightRule (formats/scoring/sight.h), "metrics": {name: value or null}, "passed", "pass_marks": [...], "insertions":
 // [...], "targets": [...], "warnings": [...]}.
 std::string score_json(const SessionScore& score, const Exercise& exercise);
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The part of the scan plane that a probe shows, how much of a straight needle lies in it, and what
-// sound reaches: a point behind a rib, behind gas or under a part of the face that is in the air is
-// in the image and yet cannot be seen.
+// The part of the scan plane that a probe shows, what sound reaches there, and how far a straight
+// needle shows. Renderer's truth, live marks, scores, reviews, data sets and the planner of needle
+// paths all ask here, and a test compares the answers with rendered pixels.
 #pragma once
 
 #include "formats/base/geometry.h"
@@ -36,14 +36,17 @@ ImageInterval interval_in_image(const Probe& probe, Point3 a, Point3 b, double h
 // The length of that part.
 double length_in_image(const Probe& probe, Point3 a, Point3 b, double half_slab_mm);
 
-inline constexpr double kSightStepMm = 1;   // spacing of the tested points of a ray
-inline constexpr double kCoupledAirMm = 4;  // thickness of air that gel fills
+inline constexpr double kSightStepMm = 1;   // spacing of the tested points of a scan line
 inline constexpr double kSightShaftMm = 2;  // spacing of the tested points of a shaft
+// The rule by which a needle counts as visible, stated beside scores: 1 counted everything in a
+// bone's shadow and under more than 4 mm of air as unseen, and measured the needle outside the
+// sector as well; 2 is the one below.
+inline constexpr int kSightRule = 2;
 
-// True if the scan line through the point meets neither bone nor gas before it, and at most
-// kCoupledAirMm of air. Tissue counts where breathing has moved it. A point off the scan plane has
-// the scan line of its projection on the plane, shifted by its distance to the plane. Always true
-// where the anatomy does not know its tissues.
+// True if the scan line through the point meets the body within the gap that the picture closes,
+// and neither bone nor gas before the point. Tissue counts where breathing has moved it. A point
+// off the scan plane has the scan line of its projection on the plane, shifted by its distance to
+// the plane. Always true where the anatomy does not know its tissues.
 //
 // mannequin_from_probe  pose of the probe
 // p_probe               the point, `probe` frame
@@ -54,14 +57,50 @@ bool sound_reaches(const Anatomy& anatomy,
                    Point3 p_probe,
                    double time_s);
 
-// Length of the segment a-b (`probe` frame) that is in the image and reached by sound, which is
-// tested every kSightShaftMm.
-double visible_length(const Anatomy& anatomy,
-                      const Probe& probe,
-                      const Rigid& mannequin_from_probe,
-                      Point3 a,
-                      Point3 b,
-                      double half_slab_mm,
-                      double time_s);
+// What a frame shows of a needle at neutral settings (gain 0). A point of it is visible if it lies
+// in the image, at most half the slab that the needle shows in from the scan plane, and its own
+// echo stands out of what is around it by kShownGrey. Both echoes are dimmed by the tissue before
+// them, as in model `physical`: a needle in the shadow of thin bone may show, and one behind the
+// edge of the face that has no contact does not. The needle's echo follows the angle between beam
+// and shaft; the tip glints at every angle. Where the anatomy is null or knows no tissues, whatever
+// lies in the image is visible.
+class NeedleSight {
+  public:
+    static constexpr double kShownGrey = 7.5;  // of 255, where liver has 80
+
+    // The anatomy must outlive the sight.
+    NeedleSight(const Anatomy* anatomy, const Exercise& exercise);
+
+    // Grey levels by which a point of the needle stands out. axis_probe: unit, hub to tip;
+    // from_tip_mm: back along the shaft. 0 where no sound comes. Whether the point lies in the
+    // image does not matter. Cost: that of sound_reaches().
+    double contrast(const Rigid& mannequin_from_probe,
+                    Point3 p_probe,
+                    Vector3 axis_probe,
+                    double from_tip_mm,
+                    double time_s) const;
+    bool tip_visible(const Rigid& mannequin_from_probe,
+                     Point3 tip_probe,
+                     Vector3 axis_probe,
+                     double time_s) const;
+    // Length of the shaft from tip to skin (`probe` frame) that is visible; tried every
+    // kSightShaftMm.
+    double visible_mm(const Rigid& mannequin_from_probe,
+                      Point3 tip_probe,
+                      Point3 skin_probe,
+                      double time_s) const;
+    // Length of the shaft that lies before or behind the image or in it: its projection on the
+    // scan plane is inside the sector, however far from the plane it is.
+    double in_sector_mm(Point3 tip_probe, Point3 skin_probe) const;
+    // The tip has not reached the sector, and its straight way ahead, at most the needle's length,
+    // enters the image within the slab.
+    bool on_the_way(Point3 tip_probe, Vector3 axis_probe) const;
+    double half_slab_mm() const { return half_slab_mm_; }
+
+  private:
+    const Anatomy* anatomy_;
+    Probe probe_;
+    double length_mm_ = 0, half_slab_mm_ = 0, echo_ = 0;
+};
 
 }  // namespace sonocase

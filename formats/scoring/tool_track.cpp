@@ -13,6 +13,7 @@ namespace sonocase {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kSameReadingS = 0.02;  // ages below this are not recorded
 
 Point3 position(const TrackPoint& p) {
     return {p.pose.translation.x, p.pose.translation.y, p.pose.translation.z};
@@ -145,16 +146,27 @@ ToolTrack track_of(const Session& session, Tool tool) {
         const Rigid& pose = tool == Tool::probe    ? s.mannequin_from_probe
                             : tool == Tool::needle ? s.mannequin_from_needle
                                                    : s.mannequin_from_drawn;
-        const bool falls = !track.points.empty() && s.time_s < track.points.back().time_s;
-        if (!std::isfinite(s.time_s) || !is_finite(pose) || falls) {
+        const double age_s = tool == Tool::probe ? s.probe_age_s : s.needle_age_s;
+        const double time_s = s.time_s - age_s;
+        // A pose that was shown for longer than it was measured counts once, at its own time.
+        if (age_s > 0 && !track.points.empty() &&
+            time_s <= track.points.back().time_s + kSameReadingS)
+            continue;
+        const bool falls = !track.points.empty() && time_s < track.points.back().time_s;
+        if (!std::isfinite(time_s) || !is_finite(pose) || falls) {
             ++track.run_back;
             continue;
         }
         if (!track.points.empty()) {
             track.longest_gap_s =
-                std::max(track.longest_gap_s, s.time_s - track.points.back().time_s);
+                std::max(track.longest_gap_s, time_s - track.points.back().time_s);
         }
-        track.points.push_back({s.time_s, pose, i});
+        track.points.push_back({time_s, pose, i});
+    }
+    // A tool that was lost and did not come back.
+    if (!track.points.empty() && std::isfinite(session.samples.back().time_s)) {
+        track.longest_gap_s = std::max(track.longest_gap_s,
+                                       session.samples.back().time_s - track.points.back().time_s);
     }
     return track;
 }

@@ -24,7 +24,7 @@ struct ToolTrack {
     std::vector<TrackPoint> points;  // tracked readings, times never falling
     std::size_t untracked = 0;       // readings without a pose
     std::size_t run_back = 0;        // dropped: earlier than a reading before, or not finite
-    double longest_gap_s = 0;        // between neighbours that are kept
+    double longest_gap_s = 0;        // between neighbours that are kept, or to the session's end
 };
 
 enum class Tool { probe, needle, drawn_needle };

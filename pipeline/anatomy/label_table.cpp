@@ -2,10 +2,12 @@
 
 #include "pipeline/anatomy/label_table.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
 #include "formats/files/atomic_file.h"
+#include "formats/text/json_reader.h"
 #include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/base/text.h"
 
@@ -94,17 +96,25 @@ int totalsegmentator_value(std::string_view name) {
     return 0;
 }
 
-Result<LabelTable> parse_label_csv(std::string_view csv, const std::string& where) {
-    const std::vector<TextRow> rows = split_rows(csv);
+namespace {
+
+Result<LabelTable> table_of_rows(const std::vector<TextRow>& rows, const std::string& where) {
     if (rows.empty()) return Error{"label table is empty", where, "expected rows of value,name"};
-    int value_column = 0, name_column = 1, tissue_column = -1;
+    // A label description of ITK-SNAP: index, four of colour, two switches, name.
+    const bool itk_snap =
+        rows[0].cells.size() == 8 && number_in(rows[0].cells[6]) && !number_in(rows[0].cells[7]);
+    int value_column = 0, name_column = itk_snap ? 7 : 1, tissue_column = -1;
+    int colour_column = itk_snap ? 1 : 2;
     std::size_t first = 0;
     if (!whole_in(cell_at(rows[0], 0))) {
         first = 1;
-        value_column = column_named(rows[0], {"value", "label", "index", "id", "key"});
-        name_column = column_named(rows[0], {"name", "structure", "label_name"});
+        colour_column = -1;
+        value_column = column_named(rows[0], {"value", "label", "index", "id", "key", "labelvalue",
+                                              "label_value", "label value", "label id"});
+        name_column = column_named(
+            rows[0], {"name", "structure", "label_name", "label name", "segment", "label"});
         tissue_column = column_named(rows[0], {"tissue", "tissue_class"});
-        if (value_column < 0 || name_column < 0)
+        if (value_column < 0 || name_column < 0 || name_column == value_column)
             return Error{"label table has no columns 'value' and 'name'",
                          where + ":" + std::to_string(rows[0].line),
                          "expected a header such as value,name or value,name,tissue_class"};
@@ -123,14 +133,138 @@ Result<LabelTable> parse_label_csv(std::string_view csv, const std::string& wher
                          "expected value,name"};
         entry.value = *value;
         entry.tissue_class = cell_at(rows[r], tissue_column);
+        if (colour_column >= 0) {
+            std::array<std::uint8_t, 3> rgb{};
+            bool good = true;
+            for (int c = 0; c < 3; ++c) {
+                const auto number = number_in(cell_at(rows[r], colour_column + c));
+                good = good && number.has_value();
+                if (number) rgb[static_cast<std::size_t>(c)] = colour_byte(*number, false);
+            }
+            if (good) entry.colour = rgb;
+        }
         table.push_back(std::move(entry));
     }
     return table;
 }
 
-Result<LabelTable> load_label_csv(const std::string& path) {
+// {"labels": {"liver": 5}}, {"labels": {"5": "liver"}}, {"labels": ["background", ...]}, or the
+// inner object alone.
+Result<LabelTable> parse_label_json(std::string_view text, const std::string& where) {
+    const char* expected = "expected \"labels\" with names and values, as dataset.json of nnU-Net";
+    detail::JsonFault fault;
+    fault.where = where;
+    detail::Json root;
+    if (!detail::parse_json(text, root, fault))
+        return fault.error ? *fault.error : Error{"is not JSON", where, expected};
+    const auto found = root.find("labels");
+    const detail::Json& labels = found != root.end() ? *found : root;
+    LabelTable table;
+    if (labels.is_array()) {
+        for (std::size_t n = 0; n < labels.size(); ++n)
+            if (labels[n].is_string())
+                table.push_back({static_cast<int>(n), labels[n].get<std::string>(), {}, {}, 0});
+        if (table.size() != labels.size()) table.clear();
+    } else if (labels.is_object()) {
+        for (const auto& [key, value] : labels.items()) {
+            LabelTableEntry entry;
+            const auto key_value = whole_in(key);
+            if (value.is_number_integer() && std::abs(value.get<double>()) <= 2147483647.0) {
+                entry.value = value.get<int>();
+                entry.name = key;
+            } else if (value.is_string() && key_value) {
+                entry.value = *key_value;
+                entry.name = value.get<std::string>();
+            } else if (value.is_array()) {
+                return Error{"label '" + key + "' is a region of several values", where,
+                             "expected one value for each name"};
+            } else if (&labels == &root) {
+                continue;  // another field of the file
+            } else {
+                return Error{"label '" + key + "' has no whole number", where, expected};
+            }
+            if (entry.name.empty())
+                return Error{"value " + std::to_string(entry.value) + " has no name", where,
+                             expected};
+            table.push_back(std::move(entry));
+        }
+    }
+    if (table.empty()) return Error{"names no labels", where, expected};
+    return table;
+}
+
+}  // namespace
+
+Result<LabelTable> parse_label_table(std::string_view text, const std::string& where) {
+    if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff"))
+        return Error{"label table is UTF-16", where, "save it as CSV UTF-8"};
+    int line = 1;
+    for (std::string_view rest = text; !rest.empty(); ++line) {
+        const std::size_t end = std::min(rest.find('\n'), rest.size());
+        if (!is_utf8(rest.substr(0, end)))
+            return Error{"a name is not UTF-8", where + ":" + std::to_string(line),
+                         "save the table as CSV UTF-8"};
+        rest.remove_prefix(std::min(end + 1, rest.size()));
+    }
+    if (trimmed(text.starts_with("\xEF\xBB\xBF") ? text.substr(3) : text).starts_with('{'))
+        return parse_label_json(text.starts_with("\xEF\xBB\xBF") ? text.substr(3) : text, where);
+    return table_of_rows(split_rows(text), where);
+}
+
+Result<LabelTable> load_label_table(const std::string& path) {
     SONOCASE_TRY(auto text, read_text_file(path));
-    return parse_label_csv(text, path);
+    return parse_label_table(text, path);
+}
+
+bool is_utf8(std::string_view text) {
+    for (std::size_t i = 0; i < text.size();) {
+        const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(text[at]); };
+        const unsigned char lead = byte(i);
+        const std::size_t more = lead < 0x80                    ? 0
+                                 : lead >= 0xC2 && lead <= 0xDF ? 1
+                                 : lead >= 0xE0 && lead <= 0xEF ? 2
+                                 : lead >= 0xF0 && lead <= 0xF4 ? 3
+                                                                : 4;
+        if (more == 4 || i + more >= text.size()) return false;
+        for (std::size_t n = 1; n <= more; ++n)
+            if ((byte(i + n) & 0xC0) != 0x80) return false;
+        // Overlong forms, surrogates, and what lies beyond Unicode.
+        if (more >= 2 &&
+            ((lead == 0xE0 && byte(i + 1) < 0xA0) || (lead == 0xED && byte(i + 1) > 0x9F) ||
+             (lead == 0xF0 && byte(i + 1) < 0x90) || (lead == 0xF4 && byte(i + 1) > 0x8F)))
+            return false;
+        i += more + 1;
+    }
+    return true;
+}
+
+std::string utf8_of_windows_1252(std::string_view text) {
+    // 0x80 to 0x9F; the others are those of Unicode. 0: not used.
+    constexpr std::uint16_t high[32] = {
+        0x20AC, 0,      0x201A, 0x0192, 0x201E, 0x2026, 0x2020, 0x2021, 0x02C6, 0x2030, 0x0160,
+        0x2039, 0x0152, 0,      0x017D, 0,      0,      0x2018, 0x2019, 0x201C, 0x201D, 0x2022,
+        0x2013, 0x2014, 0x02DC, 0x2122, 0x0161, 0x203A, 0x0153, 0,      0x017E, 0x0178};
+    std::string out;
+    for (const char c : text) {
+        const auto byte = static_cast<unsigned char>(c);
+        if (byte < 0x80) {
+            out += c;
+            continue;
+        }
+        unsigned code = byte < 0xA0 ? high[byte - 0x80] : byte;
+        if (code == 0) code = '?';
+        if (code < 0x80) {
+            out += static_cast<char>(code);
+        } else if (code < 0x800) {
+            out += static_cast<char>(0xC0 | (code >> 6));
+            out += static_cast<char>(0x80 | (code & 0x3F));
+        } else {
+            out += static_cast<char>(0xE0 | (code >> 12));
+            out += static_cast<char>(0x80 | ((code >> 6) & 0x3F));
+            out += static_cast<char>(0x80 | (code & 0x3F));
+        }
+    }
+    return out;
 }
 
 Result<LabelTable> parse_label_xml(std::string_view xml, const std::string& where) {
@@ -186,16 +320,29 @@ Result<LabelTable> parse_label_xml(std::string_view xml, const std::string& wher
 
 Result<LabelTable> segments_of_fields(const std::map<std::string, std::string>& fields,
                                       const std::string& where) {
+    // The numbers of all keys "Segment<N>_...": writers other than Slicer begin at 1, or leave gaps.
+    std::map<std::string, int> prefixes;  // "Segment12_" and 12
+    for (const auto& [key, text] : fields) {
+        const std::size_t end = key.find('_');
+        if (!key.starts_with("Segment") || end == std::string::npos || end == 7 || end > 7 + 9)
+            continue;
+        const auto number = whole_in(std::string_view(key).substr(7, end - 7));
+        if (number && *number >= 0) prefixes[key.substr(0, end + 1)] = *number;
+    }
+    std::vector<std::pair<int, std::string>> segments;
+    for (const auto& [prefix, number] : prefixes) segments.emplace_back(number, prefix);
+    std::sort(segments.begin(), segments.end());
     LabelTable table;
-    for (int number = 0;; ++number) {
-        const std::string prefix = "Segment" + std::to_string(number) + "_";
-        const auto field = [&](const char* key) -> std::optional<std::string> {
-            const auto found = fields.find(prefix + key);
+    int order = -1;
+    for (const auto& [number, prefix] : segments) {
+        ++order;
+        const auto field = [&, p = prefix](const char* key) -> std::optional<std::string> {
+            const auto found = fields.find(p + key);
             if (found == fields.end()) return std::nullopt;
             return found->second;
         };
         const auto name = field("Name");
-        if (!name && !field("ID")) break;
+        if (!name && !field("ID")) continue;  // its value is then told of as unnamed
         LabelTableEntry entry;
         entry.name = trimmed(name ? *name : *field("ID"));
         const auto value = field("LabelValue");
@@ -203,7 +350,7 @@ Result<LabelTable> segments_of_fields(const std::map<std::string, std::string>& 
         // these fields.
         const auto whole = value ? whole_in(trimmed(*value)) : 1;
         const auto layer = field("Layer");
-        const auto whole_layer = layer ? whole_in(trimmed(*layer)) : (value ? 0 : number);
+        const auto whole_layer = layer ? whole_in(trimmed(*layer)) : (value ? 0 : order);
         if (entry.name.empty() || !whole || !whole_layer || *whole_layer < 0)
             return Error{
                 "segment " + std::to_string(number) + " has no usable name, label value or layer",

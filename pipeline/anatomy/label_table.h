@@ -2,10 +2,10 @@
 
 // The name of each value of a label map.
 //
-// The first of these sources that exists is used: a table given by the caller (CSV), the label
+// The first of these sources that names a value is used: a table given by the caller, the label
 // table in the header extension of a NIfTI file as TotalSegmentator writes it, the segments of a
-// .seg.nrrd, a CSV beside the map with the same stem (labels.nii.gz -> labels.csv), and the
-// built-in classes of TotalSegmentator's task "total" (version 2, 117 classes).
+// .seg.nrrd, a CSV beside the map with the same stem (labels.nii.gz -> labels.csv). A map without
+// any of them may be numbered as a program numbers its maps: pipeline/import/volume/label_map.h.
 #pragma once
 
 #include <array>
@@ -35,19 +35,28 @@ std::string_view totalsegmentator_name(int value);
 // Value of a name of task "total"; 0 for any other name.
 int totalsegmentator_value(std::string_view name);
 
-// Columns by header: value (or label, index, id), name, and optionally tissue_class (or tissue).
-// Without a header, the first two columns are value and name. Error: an unreadable file, no rows, a
-// header without those columns, or a row without a whole number and a name; it names the line.
-Result<LabelTable> parse_label_csv(std::string_view csv, const std::string& where);
-Result<LabelTable> load_label_csv(const std::string& path);
+// A table in any of these forms, told apart by content:
+// - CSV with columns by header: value (or label, index, id, ...), name (or structure, label_name,
+//   ...), and optionally tissue_class (or tissue); without a header, value and name
+// - label descriptions of ITK-SNAP: index, red, green, blue, and the name in quotes
+// - colour tables of Slicer and FreeSurfer: value, name, red, green, blue
+// - JSON: dataset.json of nnU-Net, labels of MONAI, or names and values alone
+// Error: not UTF-8; an unreadable file, no rows, a header without those columns, a row without a
+// whole number and a name; it names the line.
+Result<LabelTable> parse_label_table(std::string_view text, const std::string& where);
+Result<LabelTable> load_label_table(const std::string& path);
 
 // The table in the extension of a NIfTI header: <Label Key=".." Red=".." ...>NAME</Label>, the name
 // as text or as CDATA. Empty if there is no table. Error: a damaged table.
 Result<LabelTable> parse_label_xml(std::string_view xml, const std::string& where);
 
-// Slicer's fields Segment<N>_Name, _LabelValue, _Layer and _Color; empty without any. Error: a
-// segment whose name, value or layer is unusable.
+// Slicer's fields Segment<N>_Name, _LabelValue, _Layer and _Color, whatever the numbers N; empty
+// without any. Error: a segment whose name, value or layer is unusable.
 Result<LabelTable> segments_of_fields(const std::map<std::string, std::string>& fields,
                                       const std::string& where);
+
+bool is_utf8(std::string_view text);
+// Text of Windows-1252, which programs on Windows write where they should write UTF-8, as UTF-8.
+std::string utf8_of_windows_1252(std::string_view text);
 
 }  // namespace sonocase::pipeline::inline anatomy

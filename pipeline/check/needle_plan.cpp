@@ -15,6 +15,14 @@ constexpr double kGoodEnough = 0.9;  // the search ends when this share of a pat
 constexpr double kAboveMm = 40;      // where the search for the skin beside the probe begins
 constexpr double kSteepest = 0.985;  // cosine of 10 degrees: a steeper needle meets the probe
 
+// What decides about visibility.
+Exercise exercise_of(const AimOptions& options) {
+    Exercise exercise;
+    exercise.probe = options.probe;
+    exercise.needle = options.needle;
+    return exercise;
+}
+
 }  // namespace
 
 Rigid probe_pose(Point3 skin, Vector3 beam, Vector3 lateral) {
@@ -29,15 +37,14 @@ double half_face_mm(const Probe& probe) {
 }
 
 NeedlePlanner::NeedlePlanner(const CaseLabels& labels, const AimOptions& options)
-    : options_(options), anatomy_(labels.bundle(), options.breathing) {
+    : options_(options),
+      anatomy_(labels.bundle(), options.breathing),
+      sight_(&anatomy_, exercise_of(options)) {
     const std::vector<Label>& palette = labels.bundle().labels;
     for (std::size_t l = 0; l < palette.size(); ++l)
         closed_[l] = labels.is_vessel(static_cast<int>(l)) ||
                      std::find(options.keep_clear.begin(), options.keep_clear.end(),
                                palette[l].name) != options.keep_clear.end();
-    const double slab =
-        options.needle.slab_mm > 0 ? options.needle.slab_mm : needle_diameter_mm(options.needle);
-    half_slab_mm_ = 0.5 * std::max(slab, options.probe.elevation_mm);
 }
 
 std::optional<Point3> NeedlePlanner::enter(Point3 above, Vector3 along, double reach_mm) const {
@@ -91,9 +98,9 @@ void NeedlePlanner::try_pose(const AimTarget& target,
         pose.direction = (1 / length) * (target.centre - *entry);
         if (dot(pose.direction, pose.beam) > kSteepest) continue;
         if (!free(*entry, pose.direction, length, own)) continue;
-        pose.visible = visible_length(anatomy_, probe, mannequin_from_probe, centre,
-                                      probe_from_mannequin * *entry, half_slab_mm_, 0) /
-                       length;
+        pose.visible =
+            sight_.visible_mm(mannequin_from_probe, centre, probe_from_mannequin * *entry, 0) /
+            length;
         if (!best || pose.visible > best->visible + 0.02) best = pose;
         if (best->visible > kGoodEnough) return;
     }

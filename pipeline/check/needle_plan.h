@@ -9,6 +9,7 @@
 #include <span>
 
 #include "formats/scoring/anatomy.h"
+#include "formats/scoring/sight.h"
 #include "pipeline/check/aim.h"
 
 namespace sonocase::pipeline::inline check {
@@ -45,8 +46,8 @@ class NeedlePlanner {
 
     const AimOptions& options_;
     CaseAnatomy anatomy_;
+    NeedleSight sight_;               // of anatomy_
     std::array<bool, 256> closed_{};  // labels that no needle may pass
-    double half_slab_mm_ = 0;
 };
 
 // The pose of a probe whose face has its middle at `skin`.

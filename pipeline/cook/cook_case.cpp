@@ -59,10 +59,8 @@ Result<CookResult> cook_case(const Recipe& recipe,
     CaseManifest& manifest = result.bundle.manifest;
     manifest.producer = options.producer;
     manifest.inputs = std::move(inputs.files);
-    for (const StageRun& run : result.stages) {
-        manifest.stages.push_back(run.report);
-        manifest.stages.back().seconds = 0;
-    }
+    for (const StageRun& run : result.stages)
+        manifest.stages.push_back(without_seconds({run.report}).front());
     report_progress(progress, 1, "done");
     return result;
 }

@@ -140,7 +140,7 @@ std::string plan_json(const std::vector<CasePlan>& plans, const RecipeOverrides&
         }
         json["cases"].push_back(std::move(entry));
     }
-    return json.dump(1) + "\n";
+    return json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace sonocase::pipeline::inline cook

@@ -281,7 +281,7 @@ std::string inspection_json(const CaseBundle& bundle, const Inspection& inspecti
     json["has"] = {{"boundary", !bundle.boundary.table.empty()},
                    {"echo_offset", !bundle.echo_offset.table.empty()},
                    {"speckle_edge", bundle.speckle.edge}};
-    return json.dump(2) + "\n";
+    return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 std::string inspection_text(const CaseBundle& bundle, const Inspection& inspection) {

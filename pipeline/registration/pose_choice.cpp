@@ -16,6 +16,17 @@ namespace {
 // point without a counterpart costs as much as this gap.
 constexpr double kJudgeConstraintMm = 10, kJudgeScaleMm = 5, kNoCounterpartMm = 12;
 constexpr double kCloseScore = 1.10, kQuarterTurn = 1.25;
+// Bodies whose skin has no right and left fit their mirror image within 3 % either way; those whose
+// skin has fit it 15 % worse or more.
+constexpr double kMirrorScore = 1.06;
+constexpr int kFewerStarts = 3;   // the head the other way is looked for with a third of the starts
+constexpr int kMoreSearches = 2;  // with twice the starts each, while only one start found the best
+
+// What was given beside the surfaces.
+struct Given {
+    PoseHints hints;
+    std::vector<Correspondence> landmarks;
+};
 
 double penalty(double gap) {
     return kJudgeScaleMm * kJudgeScaleMm * std::log1p(gap * gap / (kJudgeScaleMm * kJudgeScaleMm));
@@ -23,7 +34,10 @@ double penalty(double gap) {
 
 // A candidate after a stiff quadratic and a coarse field; its score sums the costs of gaps, missing
 // counterparts, deformation and hints.
-JudgedPose judge(const FitContext& s, const TargetSurface& target, const RigidCandidate& rigid) {
+JudgedPose judge(const FitContext& s,
+                 const TargetSurface& target,
+                 const Given& given,
+                 const RigidCandidate& rigid) {
     JudgedPose judged;
     judged.rigid = rigid;
     judged.quadratic = RigidQuadratic::from_rigid(rigid.target_from_skin);
@@ -35,8 +49,8 @@ JudgedPose judge(const FitContext& s, const TargetSurface& target, const RigidCa
     }
     RefineOptions options;
     options.skin_queries = 900;
-    options.landmarks = s.landmarks;
-    options.landmark_weight = s.hints.landmark_weight;
+    options.landmarks = given.landmarks;
+    options.landmark_weight = given.hints.landmark_weight;
     double deformation = 0;
     for (double constraint : {3 * kJudgeConstraintMm, kJudgeConstraintMm}) {
         options.constraint_mm = constraint;
@@ -67,19 +81,35 @@ JudgedPose judge(const FitContext& s, const TargetSurface& target, const RigidCa
     const Matches& matches = fit.matches;
     const double gaps = 0.5 * mean(matches.from_target, matches.target_queries) +
                         0.5 * mean(matches.from_skin, matches.skin_queries);
-    judged.back_cost_mm2 = s.hints.back_cost_mm2(rigid.target_from_skin);
+    judged.back_cost_mm2 = given.hints.back_cost_mm2(rigid.target_from_skin);
     double hints = judged.back_cost_mm2;
-    for (const Correspondence& c : s.landmarks) {
+    for (const Correspondence& c : given.landmarks) {
         const Vector3 r = map_point(judged.quadratic, c.skin) - c.place;
-        hints += s.hints.landmark_weight * std::min(dot(r, r), 60.0 * 60.0);
+        hints += given.hints.landmark_weight * std::min(dot(r, r), 60.0 * 60.0);
     }
-    if (s.hints.up) {
-        const Vector3 r = rigid.target_from_skin.rotation.column(2) - *s.hints.up;
-        hints += s.hints.up_weight_mm2 * dot(r, r);
+    if (given.hints.up) {
+        const Vector3 r = rigid.target_from_skin.rotation.column(2) - *given.hints.up;
+        hints += given.hints.up_weight_mm2 * dot(r, r);
     }
     judged.score_mm = std::sqrt(gaps + 0.5 * deformation + fit.energy_mm2 + hints);
     judged.coverage = static_cast<double>(matches.from_target.size()) /
                       static_cast<double>(std::max<std::size_t>(1, matches.target_queries));
+    return judged;
+}
+
+std::vector<JudgedPose> judge_candidates(const FitContext& s,
+                                         const Given& given,
+                                         RigidOptions rigid,
+                                         const Progress& progress) {
+    rigid.hints = given.hints;
+    const std::vector<RigidCandidate> candidates =
+        align_rigid_candidates(s.coarse, s.target, rigid, progress);
+    report_progress(progress, 0.2, "rigid alignment: judging candidates");
+    std::vector<JudgedPose> judged(candidates.size());
+    parallel_for(candidates.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t n = begin; n < end; ++n)
+            judged[n] = judge(s, s.target, given, candidates[n]);
+    });
     return judged;
 }
 
@@ -167,22 +197,85 @@ void warn_of_runners_up(const FitContext& s, PoseChoice* choice) {
     }
 }
 
-// The target mirrored in the patient's median plane.
-TargetSurface mirrored(const TargetSurface& target, const Rigid& pose) {
+// The target mirrored in the patient's median plane, and what was given of it.
+struct Mirror {
+    Vector3 across, middle;
+
+    Vector3 turned(Vector3 v) const { return v - 2 * dot(v, across) * across; }
+    Point3 moved(Point3 p) const { return Point3{} + middle + turned((p - Point3{}) - middle); }
+};
+
+TargetSurface mirrored(const TargetSurface& target, const Mirror& mirror) {
     TargetSurface m;
     m.origin = target.origin;
-    const Vector3 across = pose.rotation.column(0);
-    const Vector3 middle = pose.translation;
-    for (Point3 p : target.points) {
-        const double d = dot(across, (p - Point3{}) - middle);
-        m.points.push_back(p - 2 * d * across);
-    }
-    for (Vector3 n : target.normals) m.normals.push_back(n - 2 * dot(n, across) * across);
+    for (Point3 p : target.points) m.points.push_back(mirror.moved(p));
+    for (Vector3 n : target.normals) m.normals.push_back(mirror.turned(n));
     m.on_rim = target.on_rim;
     m.lifted = target.lifted;
     m.spacing_mm = target.spacing_mm;
     m.index = PointIndex(m.points);
     return m;
+}
+
+Given mirrored(Given given, const Mirror& mirror) {
+    for (PoseHints::Place& mark : given.hints.landmarks) mark.target = mirror.moved(mark.target);
+    for (Correspondence& mark : given.landmarks) mark.place = mirror.moved(mark.place);
+    if (given.hints.up) given.hints.up = mirror.turned(*given.hints.up);
+    if (given.hints.back) given.hints.back = mirror.turned(*given.hints.back);
+    return given;
+}
+
+// Left-handed axes: the surface is then a mirror image of the body, which a landmark off the
+// midline shows, or the skin where its right and left differ. Most torsos' hardly do.
+void check_hands(const FitContext& s,
+                 const Given& given,
+                 const RigidOptions& options,
+                 PoseChoice* choice) {
+    const JudgedPose& best = choice->best;
+    const Rigid& pose = best.rigid.target_from_skin;
+    const Mirror mirror{pose.rotation.column(0), pose.translation};
+    const TargetSurface target = mirrored(s.target, mirror);
+    const Given there = mirrored(given, mirror);
+    RigidOptions rigid = options;
+    rigid.hints = there.hints;
+    const double score =
+        judge(s, target, there, refine_rigid(s.coarse, target, pose, rigid)).score_mm;
+    choice->mirror_score_mm = score;
+    const std::string scores =
+        text("it fits to %.2f mm in a mirror and to %.2f mm as given", score, best.score_mm);
+    if (score * kMirrorScore < best.score_mm) {
+        choice->handedness = "wrong: " + scores;
+        choice->warnings.push_back("the surface looks like a mirror image of the patient: " +
+                                   scores + "; check that its axes are right-handed");
+    } else if (score < kMirrorScore * best.score_mm) {
+        choice->handedness = "not told by the skin: " + scores +
+                             "; a landmark off the midline would tell (--landmarks FILE.csv)";
+    } else {
+        choice->handedness = "right: " + scores;
+    }
+}
+
+// The head the other way than was said.
+void check_head(const FitContext& s,
+                const Given& given,
+                RigidOptions rigid,
+                const Progress& progress,
+                PoseChoice* choice) {
+    if (!given.hints.up) return;
+    Given turned = given;
+    turned.hints.up = -*given.hints.up;
+    rigid.starts = std::max(1, rigid.starts / kFewerStarts);
+    double score = INFINITY;
+    for (const JudgedPose& p : judge_candidates(s, turned, rigid, progress))
+        score = std::min(score, p.score_mm);
+    choice->turned_score_mm = score;
+    if (score < choice->best.score_mm) {
+        choice->warnings.push_back(text(
+            "the head direction seems to point to the feet: the skin fits to %.2f mm the other "
+            "way and to %.2f mm as given; turn its sign (--up), or give two landmarks such as "
+            "crotch and navel if it is right (--landmarks FILE.csv)",
+            score, choice->best.score_mm));
+    }
 }
 
 }  // namespace
@@ -191,38 +284,30 @@ PoseChoice choose_pose(const FitContext& s,
                        const RegisterOptions& options,
                        const Progress& progress) {
     RigidOptions rigid = options.rigid;
-    rigid.hints = s.hints;
     rigid.seed = options.seed;
+    Given given{s.hints, s.landmarks};
     report_progress(progress, 0.05, "rigid alignment: starts");
-    std::vector<RigidCandidate> candidates =
-        align_rigid_candidates(s.coarse, s.target, rigid, progress);
-    report_progress(progress, 0.2, "rigid alignment: judging candidates");
-    std::vector<JudgedPose> judged(candidates.size());
-    parallel_for(candidates.size(), 1, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t n = begin; n < end; ++n) judged[n] = judge(s, s.target, candidates[n]);
-    });
     PoseChoice choice;
-    choice.open_side_dropped = drop_open_side(s, options, judged);
-    std::stable_sort(judged.begin(), judged.end(), [](const JudgedPose& a, const JudgedPose& b) {
-        return a.score_mm < b.score_mm;
-    });
+    std::vector<JudgedPose> judged;
+    for (int search = 0;; ++search) {
+        judged = judge_candidates(s, given, rigid, progress);
+        choice.open_side_dropped = drop_open_side(s, options, judged);
+        std::stable_sort(
+            judged.begin(), judged.end(),
+            [](const JudgedPose& a, const JudgedPose& b) { return a.score_mm < b.score_mm; });
+        // A pose that one start alone has found may have a better one beside it that none has.
+        if (judged[0].rigid.found > 1 || search == kMoreSearches) break;
+        rigid.starts *= 2;
+    }
     choice.best = judged[0];
     for (std::size_t n = 1; n < judged.size(); ++n) {
         choice.runners_up.push_back(described(judged[0], judged[n]));
     }
     warn_of_runners_up(s, &choice);
-    // A mirrored surface (left-handed axes) also fits a symmetric torso: warn only if the mirrored
-    // one fits clearly better.
-    const TargetSurface mirror = mirrored(s.target, judged[0].rigid.target_from_skin);
-    const JudgedPose other =
-        judge(s, mirror, refine_rigid(s.coarse, mirror, judged[0].rigid.target_from_skin, rigid));
-    choice.mirror_score_mm = other.score_mm;
-    if (other.score_mm * kCloseScore < judged[0].score_mm) {
-        choice.warnings.push_back(
-            text("the surface looks like a mirror image of the patient: it fits to %.2f mm in a "
-                 "mirror and to %.2f mm as given; check that its axes are right-handed",
-                 other.score_mm, judged[0].score_mm));
-    }
+    if (choice.open_side_dropped) given.hints.back.reset();
+    rigid.starts = options.rigid.starts;
+    check_head(s, given, rigid, progress, &choice);
+    check_hands(s, given, rigid, &choice);
     return choice;
 }
 

@@ -36,13 +36,18 @@ void add_target(StageReport& report, const TargetSurface& t) {
     report.measures.push_back({"reading_spacing_mm", t.spacing_mm});
 }
 
-void add_organs(StageReport& report, const std::vector<OrganChange>& organs) {
+void add_organs(StageReport& report, const WarpFit& w) {
     MeasureGroup volume{"volume_change", {}}, shape{"shape_change", {}};
-    for (const OrganChange& c : organs) {
+    MeasureGroup median{"unknown_median_mm", {}}, p95{"unknown_p95_mm", {}};
+    for (const OrganChange& c : w.organs) {
         volume.values.push_back({c.label, c.volume_ratio});
         shape.values.push_back({c.label, c.shape_change});
     }
-    report.groups = {std::move(volume), std::move(shape)};
+    for (const OrganUnknown& u : w.unknown) {
+        median.values.push_back({u.label, u.median_mm});
+        p95.values.push_back({u.label, u.p95_mm});
+    }
+    report.groups = {std::move(volume), std::move(shape), std::move(median), std::move(p95)};
 }
 
 void warn_of_readings(StageReport& report, const FitContext& s, const FitMeasure& fit) {
@@ -59,8 +64,10 @@ void warn_of_readings(StageReport& report, const FitContext& s, const FitMeasure
                  t.lift_offs, static_cast<long>(t.points.size())));
     }
     if (t.points.size() < 300) {
-        report.warnings.push_back(text("only %ld readings: 500 or more make the fit trustworthy",
-                                       static_cast<long>(t.points.size())));
+        report.warnings.push_back(
+            text("only %ld readings, %.0f mm apart: what lies between them is not fitted; sweep "
+                 "again, more densely",
+                 static_cast<long>(t.points.size()), t.spacing_mm));
     }
     if (fit.coverage < 0.5) {
         report.warnings.push_back(text(
@@ -110,6 +117,8 @@ StageReport align_report(const FitContext& s,
     add_fit(report, "rigid", fit);
     report.measures.push_back({"pose_score_mm", choice.best.score_mm});
     report.measures.push_back({"mirror_score_mm", choice.mirror_score_mm});
+    if (s.hints.up) report.measures.push_back({"head_turned_score_mm", choice.turned_score_mm});
+    report.measures.push_back({"starts_at_pose", static_cast<double>(choice.best.rigid.found)});
     report.measures.push_back({"open_side_size", s.open_side.size});
     if (choice.open_side_dropped) {
         report.notes = {
@@ -118,6 +127,7 @@ StageReport align_report(const FitContext& s,
     } else {
         report.notes = {{"open_side", s.open_side_is}, {"open_side_reason", s.open_side_why}};
     }
+    report.notes.push_back({"handedness", choice.handedness});
     if (!choice.runners_up.empty()) {
         const RunnerUp& r = choice.runners_up.front();
         report.measures.push_back({"runner_up_score_mm", r.score_mm});
@@ -146,10 +156,12 @@ StageReport warp_report(const FitContext& s,
     report.measures.push_back({"counterparts", static_cast<double>(w.fit.counterparts)});
     report.measures.push_back({"unexplained_readings", static_cast<double>(w.fit.unexplained)});
     add_fit(report, "quadratic", w.quadratic_fit);
-    report.measures.push_back({"consensus", w.ransac.consensus});
-    report.measures.push_back({"rigid_consensus", w.ransac.rigid_consensus});
-    report.measures.push_back({"consensus_mm", w.ransac.consensus_mm});
-    report.measures.push_back({"folding_trials", static_cast<double>(w.ransac.folding_trials)});
+    if (options.paper_warp) {
+        report.measures.push_back({"consensus", w.ransac.consensus});
+        report.measures.push_back({"rigid_consensus", w.ransac.rigid_consensus});
+        report.measures.push_back({"consensus_mm", w.ransac.consensus_mm});
+        report.measures.push_back({"folding_trials", static_cast<double>(w.ransac.folding_trials)});
+    }
     report.measures.push_back({"constraint_mm", w.constraint_mm});
     report.measures.push_back({"quadratic_condition", w.condition});
     report.measures.push_back({"gap_standard_error_mm", w.trust.standard_error_mm});
@@ -168,7 +180,7 @@ StageReport warp_report(const FitContext& s,
     report.measures.push_back({"elastic_strain_mm2", w.elastic.strain_mm2});
     report.measures.push_back({"elastic_iterations", static_cast<double>(w.elastic.iterations)});
     report.notes = {{"path", w.path}, {"path_reason", w.reason}};
-    if (!w.organs.empty()) add_organs(report, w.organs);
+    if (!w.organs.empty()) add_organs(report, w);
     report.warnings = w.warnings;
     warn_of_readings(report, s, w.fit);
     warn_of_landmarks(report, options, w);
@@ -207,6 +219,7 @@ RegisterResult warp(const FitContext& s,
     result.quadratic_fit = w.quadratic_fit;
     result.fit = w.fit;
     result.organs = w.organs;
+    result.unknown = w.unknown;
     result.report = warp_report(s, w, options, watch.seconds());
     result.registration.reports = {result.report};
     return result;

@@ -246,7 +246,11 @@ struct Quadratic {
     QuadraticTrust trust;
 };
 
-// Decreasing weights, down to what the gaps justify or the option says.
+// Decreasing weights, down to what the gaps justify or the option says. The start is the rigid pose
+// and the steps are few, on purpose: skins tell little of displacements along them, those stay where
+// the rigid alignment left them. Run to its end at the first weight, the map of two unlike torsos
+// slides along the body until a fifth of the readings has lost its counterpart, for gaps that are
+// no truer; from the samples of a random consensus it ends in basins 10 mm apart.
 Quadratic descend(const FitContext& s,
                   const RigidQuadratic& start,
                   const RegisterOptions& options) {
@@ -288,6 +292,49 @@ double mean_move(const DisplacementGrid& field, Point3 origin, const std::vector
     return points.empty() ? 0 : sum / static_cast<double>(points.size());
 }
 
+constexpr std::size_t kPointsOfAnOrgan = 60;
+
+// What the posterior of the quadratic leaves open, label by label.
+std::vector<OrganUnknown> unknown_of(const FitContext& s,
+                                     const RigidQuadratic& q,
+                                     const QuadraticTrust& trust) {
+    std::vector<OrganUnknown> unknown;
+    if (!s.labels || trust.draws.empty()) return unknown;
+    const Grid& grid = s.labels->grid;
+    std::vector<std::size_t> voxels(256, 0), seen(256, 0);
+    for (const std::uint8_t v : s.labels->voxels) ++voxels[v];
+    std::vector<std::vector<Point3>> points(s.labels->labels.size());
+    std::size_t n = 0;
+    for (int k = 0; k < grid.size.z; ++k) {
+        for (int j = 0; j < grid.size.y; ++j) {
+            for (int i = 0; i < grid.size.x; ++i, ++n) {
+                const std::uint8_t v = s.labels->voxels[n];
+                if (v == 0 || v >= points.size()) continue;
+                const std::size_t at = seen[v]++, stride = 1 + voxels[v] / kPointsOfAnOrgan;
+                if (at % stride != stride / 2) continue;
+                points[v].push_back(Point3{} + (grid.point_from_voxel({1.0 * i, 1.0 * j, 1.0 * k}) -
+                                                s.fine.origin));
+            }
+        }
+    }
+    for (std::size_t v = 1; v < points.size(); ++v) {
+        if (points[v].empty()) continue;
+        std::vector<double> off;
+        for (const RigidQuadratic& draw : trust.draws) {
+            double sum = 0;
+            for (Point3 p : points[v]) {
+                const Vector3 d = map_point(draw, p) - map_point(q, p);
+                sum += dot(d, d);
+            }
+            off.push_back(std::sqrt(sum / static_cast<double>(points[v].size())));
+        }
+        std::sort(off.begin(), off.end());
+        unknown.push_back(
+            {s.labels->labels[v].name, off[off.size() / 2], off[off.size() * 95 / 100]});
+    }
+    return unknown;
+}
+
 }  // namespace
 
 WarpFit fit_warp(const FitContext& s,
@@ -297,26 +344,25 @@ WarpFit fit_warp(const FitContext& s,
     WarpFit w;
     const RigidQuadratic start = RigidQuadratic::from_rigid(rigid);
     w.rigid_fit = measure_fit(s.skin, s.target, in_frames(s, start));
-    RansacOptions ransac = options.ransac;
-    ransac.seed = options.seed;
-    report_progress(progress, 0.4, "quadratic warp: trials");
-    w.ransac = ransac_quadratic(s.fine, s.target, rigid, s.box, ransac, progress);
-    RigidQuadratic q = w.ransac.map;
+    RigidQuadratic q = start;
     RefineOptions stiff;
     stiff.constraint_mm = kFirstConstraintMm;
     w.rigid_trust =
         trust_quadratic(s.fine, s.target, s.readings, start, stiff, options.strain, s.inside);
-    if (!options.paper_warp) {
+    if (options.paper_warp) {
+        report_progress(progress, 0.4, "quadratic warp: trials");
+        RansacOptions ransac = options.ransac;
+        ransac.seed = options.seed;
+        w.ransac = ransac_quadratic(s.fine, s.target, rigid, s.box, ransac, progress);
+        q = w.ransac.map;
+    } else {
         report_progress(progress, 0.55, "quadratic warp: point to surface");
-        // The result of the trials is another start beside the rigid one.
-        const QuadraticTrust trial =
-            trust_quadratic(s.fine, s.target, s.readings, q, stiff, options.strain, s.inside);
-        if (!(trial.fitted_mm < w.rigid_trust.fitted_mm)) q = start;
-        const Quadratic fitted = descend(s, q, options);
+        const Quadratic fitted = descend(s, start, options);
         // Never worse than the rigid map: patches that the fit did not see must lie closer as well.
         w.kept_rigid =
             !(fitted.trust.patches > 0 && fitted.trust.held_out_mm < w.rigid_trust.fitted_mm);
         w.trust = fitted.trust;
+        w.unknown = unknown_of(s, fitted.map, fitted.trust);
         q = w.kept_rigid ? start : fitted.map;
         if (!w.kept_rigid) {
             w.constraint_mm = fitted.constraint_mm;

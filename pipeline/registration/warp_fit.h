@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// From a rigid pose to the complete map: RANSAC, the point-to-surface quadratic with as much
-// freedom as the data justify, then the displacement that follows it.
+// From a rigid pose to the complete map: the point-to-surface quadratic with as much freedom as the
+// data justify, then the displacement that follows it. Nothing is drawn at random; only the paper's
+// own warp has its random consensus.
 //
 // Which displacement follows the quadratic: none, the residual warp or the elastic warp.
 //
@@ -24,7 +25,7 @@ namespace sonocase::pipeline::inline registration {
 
 struct WarpFit {
     Registration registration;
-    RansacResult ransac;
+    RansacResult ransac;       // of the paper's warp
     double constraint_mm = 0;  // the chosen weight; 0: none, the map is that of RANSAC or rigid
     double condition = 0;
     QuadraticTrust trust, rigid_trust;
@@ -37,6 +38,7 @@ struct WarpFit {
     double stiffness = 0;    // of the elastic warp; 0: it was not tried
     OneToOneProof one_to_one;
     std::vector<OrganChange> organs;  // empty without labels
+    std::vector<OrganUnknown> unknown;
     FitMeasure rigid_fit, quadratic_fit, fit;
     double residual_mean_mm = 0;  // at the skin
     std::vector<std::string> warnings;

@@ -213,7 +213,7 @@ std::string timeline_svg(const ReviewInput& input) {
         {"tip to target", "mm, nearest", &c.tip_to_target_mm, pass_distance_mm(input.exercise), 10,
          false},
         {"tip to scan plane", "mm", &c.plane_distance_mm, NAN, 5, true},
-        {"needle in the beam", "part of what is in", &c.in_beam_fraction, NAN, 1, false}};
+        {"needle visible", "part inside the sector", &c.in_beam_fraction, NAN, 1, false}};
     const double lanes_from = y;
     if (!c.time_s.empty()) {
         for (const Lane& lane : lanes) {

@@ -4,6 +4,7 @@
 #include "pipeline/stages/import_stage.h"
 
 #include "formats/files/load_save.h"
+#include "pipeline/anatomy/anatomy_check.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/case_tissues.h"
 #include "pipeline/stages/label_codec.h"
@@ -33,7 +34,11 @@ LabelFile sample_analytic(const AnalyticInput& in) {
 }
 
 void add_meshes(OptionsOf<MeshImportOptions>& options) {
-    options.help_group("Organ meshes")
+    options
+        .choice(
+            "anatomy", [](auto& o) { return &o.anatomy; }, {"check", "accept"}, "",
+            "check: refuse labels that fit no human body; accept: warn only")
+        .help_group("Organ meshes")
         .number(
             "voxel_mm", [](auto& o) { return &o.mesh.voxel_mm; }, 0.3, 10, "mm",
             "meshes: edge of the voxels")
@@ -137,8 +142,8 @@ Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
         LabelFile{"ct", std::move(imported.labels), {}, {}, {std::move(imported.report)}});
 }
 
-// The texts hold everything that the labels depend on; for the analytic torso, what its label map
-// shows of it.
+// The texts hold everything that the labels and their report depend on; for the analytic torso,
+// what its label map shows of it.
 std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& digests) {
     const RecipeInputs& in = recipe.inputs;
     const AnalyticBody& body = in.torso.body;
@@ -148,21 +153,35 @@ std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& dig
                           in.torso.slice_mm})};
     const std::string files = digests.labels + " " + digests.label_table;
     if (is_mesh_source(recipe.resolve(in.labels)))
-        return {key_text(files + " axes " + in.labels_axes, {in.labels_scale, kMeshImportVersion})};
-    return {key_text(files, {in.labels_scale})};
+        return {key_text(files + " axes " + in.labels_axes,
+                         {in.labels_scale, kMeshImportVersion, kAnatomyCheckVersion})};
+    return {key_text(files + " " + in.label_names + " " + in.orientation,
+                     {in.labels_scale, in.resample_shear ? 1.0 : 0.0, kVolumeReadingVersion,
+                      kAnatomyCheckVersion})};
 }
 
 StageVerb verb() {
     StageVerb verb;
     verb.inputs = {
         {"LABELS", "",
-         "NIfTI, NRRD, .seg.nrrd, MetaImage, folder of masks, folder of DICOM slices, or organ "
+         "NIfTI, NRRD, .seg.nrrd, MetaImage, DICOM file or folder, folder of masks, or organ "
          "meshes (GLB, STL, PLY, OBJ, VTP, VTK, or a folder of them)",
          true, &RecipeInputs::labels},
         {"--table", "FILE.csv",
-         "Names of the values: rows of value,name[,tissue_class]; of meshes: node,label,role",
+         "Names of the values: rows of value,name[,tissue_class], or a table of ITK-SNAP, Slicer, "
+         "FreeSurfer or nnU-Net; of meshes: node,label,role",
          false, &RecipeInputs::label_table},
         {"--scale", "", "Millimetres per unit of the file", false, &RecipeInputs::labels_scale},
+        {"--names", "", "Whose numbers the values are that neither the file nor a table names",
+         false, &RecipeInputs::label_names, names_options()},
+        {"--orientation",
+         "",
+         "Which transform of a NIfTI header places the voxels",
+         false,
+         &RecipeInputs::orientation,
+         {"auto", "sform", "qform"}},
+        {"--resample-shear", "", "Resample a map whose axes are not at right angles", false,
+         &RecipeInputs::resample_shear},
         {"--axes",
          "",
          "Meshes: axes of the coordinates, whatever the files say",
@@ -179,11 +198,9 @@ StageVerb verb() {
     return verb;
 }
 
-}  // namespace
-
-Result<ImportedLabels> import_inputs(const Recipe& recipe,
-                                     const MeshImportOptions& given,
-                                     const Progress& progress) {
+Result<ImportedLabels> read_inputs(const Recipe& recipe,
+                                   const MeshImportOptions& given,
+                                   const Progress& progress) {
     const RecipeInputs& in = recipe.inputs;
     const std::string path = recipe.resolve(in.labels), table = recipe.resolve(in.label_table);
     if (is_mesh_source(path)) {
@@ -198,7 +215,27 @@ Result<ImportedLabels> import_inputs(const Recipe& recipe,
     ImportOptions options;
     options.table = table;
     options.scale = in.labels_scale;
+    options.names = in.label_names;
+    options.reading.orientation = in.orientation == "sform"   ? Orientation::sform
+                                  : in.orientation == "qform" ? Orientation::qform
+                                                              : Orientation::automatic;
+    options.reading.resample_shear = in.resample_shear;
     return import_label_map(path, options, progress);
+}
+
+}  // namespace
+
+Result<ImportedLabels> import_inputs(const Recipe& recipe,
+                                     const MeshImportOptions& given,
+                                     const Progress& progress) {
+    SONOCASE_TRY(auto imported, read_inputs(recipe, given, progress));
+    const std::string path = recipe.resolve(recipe.inputs.labels);
+    const auto odd =
+        report_anatomy(imported.labels, {.mesh = is_mesh_source(path)}, imported.report);
+    if (odd && given.anatomy != "accept")
+        return Error{"this is no human body: " + *odd, path,
+                     "if it is one, give --anatomy accept, or anatomy = \"accept\" in [import]"};
+    return imported;
 }
 
 StageDescriptor import_stage() {

@@ -15,6 +15,7 @@
 #include "formats/text/toml_reader.h"
 #include "formats/volume/tissue.h"
 #include "pipeline/anatomy/tissue_table.h"
+#include "pipeline/import/volume/label_map.h"
 #include "pipeline/pathology/place_pathology.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "pipeline/stages/embedded_scenario.h"
@@ -85,6 +86,9 @@ void read_inputs(const TomlTable& table, RecipeInputs& inputs) {
     table.text("labels_axes", inputs.labels_axes, {"file", "ras", "lps"});
     table.text("surface_axes", inputs.surface_axes, {"file", "ras", "lps"});
     table.number("labels_scale", inputs.labels_scale, kMinScale, kMaxScale);
+    table.text("label_names", inputs.label_names, names_options());
+    table.text("orientation", inputs.orientation, {"auto", "sform", "qform"});
+    table.flag("resample_shear", inputs.resample_shear);
     table.number("surface_scale", inputs.surface_scale, kMinScale, kMaxScale);
     read_up(table, inputs);
     table.finish();

@@ -99,6 +99,9 @@ struct RecipeInputs {
     std::string surface_landmarks;  // those of the same names on the surface
     std::string labels_axes = "file", surface_axes = "file";  // or "ras", "lps": told by hand
     double labels_scale = 1;
+    std::string label_names = "auto";  // names_options()
+    std::string orientation = "auto";  // of a NIfTI map: "auto", "sform" or "qform"
+    bool resample_shear = false;       // of a map with slanted axes
     double surface_scale = 1;
     std::optional<Vector3> up;  // the patient's head direction in the surface's frame
 };

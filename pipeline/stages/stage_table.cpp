@@ -10,7 +10,12 @@
 namespace sonocase::pipeline::inline stages {
 
 std::vector<StageReport> without_seconds(std::vector<StageReport> reports) {
-    for (StageReport& report : reports) report.seconds = 0;
+    for (StageReport& report : reports) {
+        report.seconds = 0;
+        std::erase_if(report.notes, [](const Note& note) {
+            return note.name == "anatomy" && note.text.starts_with("agrees");
+        });
+    }
     return reports;
 }
 

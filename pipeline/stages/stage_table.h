@@ -150,6 +150,7 @@ std::function<std::vector<StageReport>(const StageValue& value)> reports_of(cons
 }
 
 // The reports with their seconds set to zero: what a stage's bytes hold of them.
+// Nor do they hold the word that anatomy agrees; what does not agree stays.
 std::vector<StageReport> without_seconds(std::vector<StageReport> reports);
 
 // What the stages of a case are sized by.
@@ -184,7 +185,7 @@ struct VerbInput {
     std::string type_name;
     std::string meaning;
     bool required = false;
-    std::variant<std::string RecipeInputs::*, double RecipeInputs::*> to;
+    std::variant<std::string RecipeInputs::*, double RecipeInputs::*, bool RecipeInputs::*> to;
     std::vector<std::string> choices = {};  // of a text; empty: any
 };
 

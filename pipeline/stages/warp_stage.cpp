@@ -56,11 +56,7 @@ void add_quadratic(OptionsOf<Fit>& options) {
         .help_group("Quadratic warp")
         .number(
             "trials", [](auto& o) { return &o.ransac.trials; }, 1, 100000, "",
-            "trials of the random consensus")
-        .sweep({"register",
-                {"10", "30", "100", "300"},
-                "the start of the refinement",
-                "the point-to-surface refinement that follows ends in the same place"})
+            "trials of the paper's random consensus")
         .number(
             "correspondences", [](auto& o) { return &o.ransac.correspondences; }, 10, 200, "",
             "correspondences of each trial")
@@ -75,7 +71,7 @@ void add_quadratic(OptionsOf<Fit>& options) {
             "slopes that the map is expected to have")
         .toggle(
             "paper", [](auto& o) { return &o.paper_warp; },
-            "stop after the random consensus, eqs. (3)-(9)");
+            "the paper's random consensus, eqs. (3)-(9), instead of the refinement");
 }
 
 void add_residual(OptionsOf<Fit>& options) {

@@ -100,7 +100,7 @@ Suite register_suite() {
                     "noise of the readings",
                     ""}};
     for (Knob& knob : knobs_of(built_in_stages(), suite.name)) suite.knobs.push_back(knob);
-    suite.pairs = {{"mannequin.points", "warp.spacing_mm"}, {"align.starts", "warp.trials"}};
+    suite.pairs = {{"mannequin.points", "warp.spacing_mm"}};
     suite.named = {{TrialRole::paper, "paper, eqs. (3)-(9)", {{"warp.paper", "true"}}},
                    {TrialRole::peer, "quadratic without residual", {{"warp.residual", "false"}}}};
     suite.measure = [known](const Settings& settings) { return measure_fit(*known, settings); };

@@ -82,8 +82,9 @@ std::string people_text(const NeedleFit& fit) {
 
 int calibrate_needle(int argc, char** argv) {
     CLI::App app(
-        "Find a needle's axis and tip from pivots through a pinhole at several depths, one "
-        "recording each",
+        "Find a needle's axis and tip: from one pivot of the tip and a spin, or from pivots "
+        "through a "
+        "pinhole at several depths, one recording each",
         "sonocase calibrate needle");
     CalibrateOptions options;
     options.add(app, 0);
@@ -93,7 +94,8 @@ int calibrate_needle(int argc, char** argv) {
         ->delimiter(',')
         ->type_name("MM,MM,...");
     app.add_option("--spin", spin,
-                   "Recording of the needle spun in a groove: compared with the pinholes")
+                   "Recording of the needle spun in a groove: its axis, with the tip of one "
+                   "--poses; compared with the pinholes of several")
         ->type_name("FILE");
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
     const Stopwatch watch;
@@ -117,14 +119,23 @@ int calibrate_needle(int argc, char** argv) {
     }
     NeedleOptions how;
     how.depths_mm = depths;
-    if (!recordings.empty()) {
+    // One recording beside a spin is a pivot of the tip itself.
+    const bool joined = recordings.size() == 1 && !spin.empty();
+    if (joined) {
+        fit = join_pivot_and_spin(fit_point(recordings[0], how.point), turned);
+    } else if (!recordings.empty()) {
         fit = fit_needle(recordings, how);
     } else {
         fit = turned;
+        if (fit.determined)
+            fit.problem =
+                "a spin gives neither the tip nor which way the needle points, so that nothing is "
+                "saved; add --poses PIVOT with the tip on a fixed point";
+        fit.determined = false;
     }
     std::vector<std::string> warnings = fit.warnings;
     Json json = json_of(fit);
-    if (!spin.empty() && !recordings.empty()) {
+    if (!spin.empty() && recordings.size() > 1) {
         const NeedleAgreement same = compare(fit, turned);
         json["spin"] = {{"direction", json_triple(turned.direction)},
                         {"angle_deg", json_number(same.angle_rad / kRadPerDeg)},

@@ -76,14 +76,18 @@ struct VerbArguments {
 void add_inputs(CLI::App& app, const StageVerb& verb, RecipeInputs& inputs) {
     for (const VerbInput& input : verb.inputs) {
         CLI::Option* option = nullptr;
-        if (const auto text = std::get_if<std::string RecipeInputs::*>(&input.to))
+        if (const auto text = std::get_if<std::string RecipeInputs::*>(&input.to)) {
             option = app.add_option(input.flags, inputs.**text, input.meaning);
-        else
+            if (!input.choices.empty())
+                option->check(CLI::IsMember(input.choices))->capture_default_str();
+        } else if (const auto flag = std::get_if<bool RecipeInputs::*>(&input.to)) {
+            option = app.add_flag(input.flags, inputs.**flag, input.meaning);
+        } else {
             option = app.add_option(input.flags, inputs.*std::get<double RecipeInputs::*>(input.to),
                                     input.meaning)
                          ->check(CLI::Range(kMinScale, kMaxScale))
                          ->capture_default_str();
-        if (!input.choices.empty()) option->check(CLI::IsMember(input.choices));
+        }
         if (!input.type_name.empty()) option->type_name(input.type_name);
         option->required(input.required);
     }

@@ -139,7 +139,7 @@ std::string build_report(const CookResult& cooked,
         for (const std::string& warning : report.warnings)
             json["warnings"].push_back(report.stage + ": " + warning);
     }
-    return json.dump(2) + "\n";
+    return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 Result<std::optional<Choice>> choose(const BuildOptions& options, Recipe& recipe, double speed) {

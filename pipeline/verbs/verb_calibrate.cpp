@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <ctime>
 #include <string>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 
@@ -19,8 +20,10 @@
 namespace sonocase::pipeline::inline verbs {
 
 void CalibrateOptions::add(CLI::App& app, int min_recordings) {
-    app.add_option("--poses", poses,
-                   "Recordings: CSV (frame,timestamp_s,status,tx,ty,tz,r00..r22) or IGSIO sequence")
+    app.add_option(
+           "--poses", poses,
+           "Recordings: CSV (frame,timestamp_s,status,tx,ty,tz,r00..r22 or a quaternion), IGSIO "
+           "sequence, or PerkTutor log")
         ->type_name("FILE")
         ->required(min_recordings > 0)
         ->expected(std::max(1, min_recordings), 1000);
@@ -51,9 +54,7 @@ std::string CalibrateOptions::today() const {
 }
 
 Result<std::vector<Pose>> CalibrateOptions::load(const std::string& path) const {
-    const bool sequence = path.ends_with(".mha") || path.ends_with(".nrrd");
-    if (!sequence) return load_poses(path);
-    SONOCASE_TRY(auto read, load_sequence(path));
+    SONOCASE_TRY(const Sequence read, load_recording_file(path));
     int index = 0;
     if (!transform.empty()) {
         index = read.transform_index(transform);
@@ -71,23 +72,8 @@ Result<std::vector<Pose>> CalibrateOptions::load(const std::string& path) const 
                                        : "the sequence has no transform " + transform,
                      path, "name one with --transform: " + (names.empty() ? "it has none" : names)};
     }
-    std::vector<Pose> out;
-    for (const SequenceFrame& frame : read.frames) {
-        const SequencePose& given = frame.poses[index];
-        Pose pose;
-        pose.frame = frame.number;
-        pose.timestamp_s = frame.timestamp_s;
-        pose.ok = given.ok;
-        // Poor rotations are kept as read: screen_poses reports them.
-        for (int r = 0; r < 3; ++r) {
-            for (int c = 0; c < 3; ++c) {
-                pose.tracker_from_tool.rotation(r, c) = given.to_from[4 * r + c];
-            }
-            pose.tracker_from_tool.translation[r] = given.to_from[4 * r + 3];
-        }
-        out.push_back(pose);
-    }
-    return out;
+    // Poor rotations are kept as read: screen_poses reports them.
+    return poses_of(read, index);
 }
 
 Result<std::vector<Pose>> CalibrateOptions::recording(std::size_t k) const {
@@ -101,6 +87,11 @@ Result<std::vector<Pose>> CalibrateOptions::recording(std::size_t k) const {
     const std::string& path = reference[reference.size() == 1 ? 0 : k];
     auto base = load(path);
     if (!base) return base;
+    for (const auto& [poses_read, of] : {std::pair(&*tool, poses[k]), std::pair(&*base, path)}) {
+        if (!has_times(*poses_read))
+            return Error{"its readings have no times, or all the same", of,
+                         "they are needed to find the reference's: record with time stamps"};
+    }
     std::vector<Pose> relative = relative_poses(*base, *tool);
     if (relative.empty() && !tool->empty()) {
         return Error{"no reading of the reference is at the time of one of " + poses[k], path,
@@ -200,7 +191,8 @@ constexpr SubVerb kSubVerbs[] = {
     {"point", "tip of the probe or of a pointer, resting on a fixed point (pivot)",
      calibrate_point},
     {"direction", "the probe's axes, from a sweep along each", calibrate_direction},
-    {"needle", "axis and tip of the needle, through a pinhole at several depths", calibrate_needle},
+    {"needle", "axis and tip of the needle: a pivot and a spin, or a pinhole at several depths",
+     calibrate_needle},
     {"mannequin", "where the mannequin is, from landmarks or a sweep of its skin",
      calibrate_mannequin},
     {"image", "the image in the probe, from touches of both ends of the face", calibrate_image},

@@ -172,7 +172,7 @@ Progress ProgressBar::progress() {
 }
 
 std::string report_json(const StageReport& report) {
-    return flat_json(report).dump(2) + "\n";
+    return flat_json(report).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 Status write_report(const CommonOptions& options, const StageReport& report) {

@@ -80,9 +80,14 @@ int verb_validate(int argc, char** argv) {
         all.push_back(
             {{"bundle", path}, {"valid", valid}, {"errors", errors}, {"remarks", remarks}});
     }
-    if (json) std::printf("%s\n", all.dump(2).c_str());
+    if (json)
+        std::printf("%s\n",
+                    all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
     if (!common.report_path.empty())
-        if (auto status = write_file(common.report_path, all.dump(2) + "\n"); !status)
+        if (auto status = write_file(
+                common.report_path,
+                all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+            !status)
             return fail("validate", status.error());
     return all_valid ? kDone : kFailed;
 }

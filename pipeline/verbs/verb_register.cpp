@@ -21,6 +21,7 @@
 #include "formats/text/number_text.h"
 #include "pipeline/base/parallel.h"
 #include "pipeline/import/mesh/surface_file.h"
+#include "pipeline/import/volume/label_map.h"
 #include "pipeline/registration/fit_pictures.h"
 #include "pipeline/registration/landmark_candidates.h"
 #include "pipeline/registration/landmark_file.h"
@@ -128,6 +129,16 @@ void add_register_options(CLI::App& app, RegisterArguments& a, bool several) {
     surface->expected(1, several ? 100 : 1);
     app.add_option("--table", in.label_table, "CSV of value,name[,tissue_class] for the label map")
         ->type_name("FILE.csv");
+    app.add_option("--names", in.label_names,
+                   "Whose numbers the values are that neither the file nor a table names")
+        ->check(CLI::IsMember(names_options()))
+        ->capture_default_str();
+    app.add_option("--orientation", in.orientation,
+                   "Which transform of a NIfTI header places the voxels")
+        ->check(CLI::IsMember(std::vector<std::string>{"auto", "sform", "qform"}))
+        ->capture_default_str();
+    app.add_flag("--resample-shear", in.resample_shear,
+                 "Resample a label map whose axes are not at right angles");
     app.add_option("--up", a.up, "The patient's head direction in the surface's frame")
         ->type_name("X,Y,Z");
     app.add_option("--landmarks", in.landmarks,
@@ -157,7 +168,7 @@ struct RegisterInputs {
     RegisterOptions options;
     double import_seconds = 0;
     std::vector<Measure> reduction;  // of a dense mannequin, as import_surface reports it
-    std::vector<Note> notes;         // what axes and units were taken for
+    std::vector<Note> notes;         // of the import: what axes and units were taken for, the anatomy
     std::vector<std::string> warnings;
 };
 // What becomes of a dense scan, without its size.
@@ -212,7 +223,7 @@ Result<RegisterInputs> read_register_inputs(const RegisterArguments& a, const Pr
     SONOCASE_TRY(ImportedLabels labels,
                  import_inputs(a.recipe, a.recipe.settings.of<MeshImportOptions>(), progress));
     for (const Note& note : labels.report.notes)
-        if (note.name == "axes") inputs.notes.push_back(note);
+        if (note.name == "anatomy" || note.name == "axes") inputs.notes.push_back(note);
     inputs.warnings = surface_report.warnings;
     inputs.warnings.insert(inputs.warnings.end(), labels.report.warnings.begin(),
                            labels.report.warnings.end());
@@ -255,6 +266,7 @@ void add_input_reports(const RegisterInputs& inputs, StageReport& report) {
     report.measures.push_back({"import_seconds", inputs.import_seconds});
     report.measures.push_back({"surface_seconds", inputs.skin.report.seconds});
     report.seconds += inputs.skin.report.seconds;
+    report.notes.insert(report.notes.end(), inputs.notes.begin(), inputs.notes.end());
     report.warnings.insert(report.warnings.begin(), inputs.warnings.begin(), inputs.warnings.end());
 }
 

@@ -32,9 +32,12 @@ void on_glfw_error(int, const char* text) {
 }
 
 KeyTaps<GLFW_KEY_LAST + 1> g_taps;  // GLFW calls back without context
+struct {
+    bool shift = false, control = false, alt = false;
+} g_held;  // as they were before the taps of a picture were added
 
 void on_key(GLFWwindow* window, int key, int scancode, int action, int modifiers) {
-    if (action == GLFW_PRESS) g_taps.press(key);
+    if (action == GLFW_PRESS) g_taps.press(key, modifiers);
     ImGui_ImplGlfw_KeyCallback(window, key, scancode, action, modifiers);
 }
 
@@ -192,7 +195,8 @@ void Window::set_title(const std::string& title) {
 
 bool Window::key_held() const {
     const ImGuiIO& io = ImGui::GetIO();
-    return std::any_of(std::begin(io.KeysDown), std::end(io.KeysDown), [](bool d) { return d; }) ||
+    return g_taps.waiting() ||
+           std::any_of(std::begin(io.KeysDown), std::end(io.KeysDown), [](bool d) { return d; }) ||
            std::any_of(std::begin(io.MouseDown), std::end(io.MouseDown), [](bool d) { return d; });
 }
 
@@ -234,8 +238,8 @@ void Window::begin_frame(const InjectedInput& injected) {
     }
     ImGui_ImplOpenGL3_NewFrame();
     ImGui_ImplGlfw_NewFrame();
+    ImGuiIO& io = ImGui::GetIO();
     if (injected.active) {
-        ImGuiIO& io = ImGui::GetIO();
         io.MousePos = {injected.x, injected.y};
         for (std::size_t i = 0; i < injected.buttons.size(); ++i) {
             io.MouseDown[i] = injected.buttons[i];
@@ -249,13 +253,21 @@ void Window::begin_frame(const InjectedInput& injected) {
         io.KeyCtrl = injected.control;
         io.KeyAlt = injected.alt;
     }
-    g_taps.hold(ImGui::GetIO().KeysDown);
+    g_held = {io.KeyShift, io.KeyCtrl, io.KeyAlt};
+    const int modifiers = g_taps.hold(io.KeysDown);
+    io.KeyShift = io.KeyShift || (modifiers & GLFW_MOD_SHIFT) != 0;
+    io.KeyCtrl = io.KeyCtrl || (modifiers & GLFW_MOD_CONTROL) != 0;
+    io.KeyAlt = io.KeyAlt || (modifiers & GLFW_MOD_ALT) != 0;
     ImGui::NewFrame();
 }
 
 void Window::end_frame(bool capture) {
     ImGui::Render();
-    g_taps.release(ImGui::GetIO().KeysDown);
+    ImGuiIO& io = ImGui::GetIO();
+    g_taps.release(io.KeysDown);
+    io.KeyShift = g_held.shift;
+    io.KeyCtrl = g_held.control;
+    io.KeyAlt = g_held.alt;
     paint_window(impl_->window, capture ? &capture_ : nullptr);
 }
 

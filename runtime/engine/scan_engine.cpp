@@ -14,7 +14,35 @@ namespace {
 const SensorReading* sensor(const TrackerReading& reading, int index) {
     if (index < 0 || index >= reading.sensor_count || index >= kMaxSensors) return nullptr;
     const SensorReading& s = reading.sensors[index];
-    return s.state == SensorState::ok || s.state == SensorState::poor ? &s : nullptr;
+    const bool ok = s.state == SensorState::ok || s.state == SensorState::poor;
+    return ok && is_finite(s.world_from_sensor) ? &s : nullptr;
+}
+
+bool is_pose(const SensorReading& s) {
+    return s.state == SensorState::ok || s.state == SensorState::poor;
+}
+
+// True if sensor `index` gives exactly the identity though it, or another, has been elsewhere.
+bool at_identity(const TrackerReading& reading, const TrackerReading& before, int index) {
+    const SensorReading &now = reading.sensors[index], &was = before.sensors[index];
+    if (!is_pose(now) || !(now.world_from_sensor == Rigid{})) return false;
+    if (was.state == SensorState::lost || (is_pose(was) && !(was.world_from_sensor == Rigid{})))
+        return true;
+    for (int i = 0; i < std::min(reading.sensor_count, kMaxSensors); ++i) {
+        if (is_pose(reading.sensors[i]) && !(reading.sensors[i].world_from_sensor == Rigid{}))
+            return true;
+    }
+    return false;
+}
+
+// True if a sensor other than `index` has another pose than in the reading before.
+bool another_moved(const TrackerReading& reading, const TrackerReading& before, int index) {
+    for (int i = 0; i < std::min(reading.sensor_count, kMaxSensors); ++i) {
+        if (i != index && is_pose(reading.sensors[i]) &&
+            !(reading.sensors[i].world_from_sensor == before.sensors[i].world_from_sensor))
+            return true;
+    }
+    return false;
 }
 
 }  // namespace
@@ -25,7 +53,7 @@ ToolPoses tool_poses(const TrackerReading& reading,
     // Scripts and the mouse deliver tools rather than sensors, always at the default indices.
     const SensorAssignment places = reading.in_mannequin ? SensorAssignment{} : assignment;
     const auto place = [&](const SensorReading& s, const std::optional<Calibration>& tool) {
-        if (reading.in_mannequin) return s.world_from_sensor;
+        if (reading.in_mannequin || s.in_mannequin) return s.world_from_sensor;
         Rigid world_from_tool = s.world_from_sensor;
         if (tool) world_from_tool = world_from_tool * tool->sensor_from_tool;
         if (!calibrations.mannequin) return world_from_tool;
@@ -74,30 +102,32 @@ Result<ScanEngine> ScanEngine::create(CaseView bundle,
     return ScanEngine(bundle, std::move(adjusted), options, std::move(renderer));
 }
 
-void ScanEngine::observe(const TrackerReading& reading, bool is_device) {
+void ScanEngine::observe(const TrackerReading& given, bool is_device) {
+    TrackerReading reading = given;
+    const SensorAssignment places = reading.in_mannequin ? SensorAssignment{} : assignment_;
     const auto feed = [&](SensorWatch& watch, int index) {
         const bool present = index >= 0 && index < reading.sensor_count && index < kMaxSensors;
-        const SensorReading none;
-        watch.observe(present ? reading.sensors[index] : none, reading.time_s, is_device);
+        if (!present) return watch.observe({}, reading.time_s, is_device);
+        if (is_device && at_identity(reading, reading_, index))
+            reading.sensors[index].state = SensorState::lost;
+        watch.observe(reading.sensors[index], reading.time_s, is_device,
+                      another_moved(reading, reading_, index));
     };
-    const SensorAssignment places = reading.in_mannequin ? SensorAssignment{} : assignment_;
     feed(probe_watch_, places.probe);
     feed(needle_watch_, places.needle);
     force_watch_.observe(reading.force_n, reading.time_s);
     reading_ = reading;
     ToolPoses tools = tool_poses(reading, calibrations_, assignment_);
+    // Readings in `mannequin` of no device (scripts, the mouse, sessions recorded here) were checked
+    // where they were made: holding them back a second time would make a replay differ.
+    const bool checked = reading.in_mannequin && !is_device;
     // A lost probe keeps its last place, so that the picture freezes rather than flickers.
-    // Readings in `mannequin` (scripts, the mouse, sessions recorded here) were checked where they
-    // were made: holding them back a second time would make a replay differ.
-    const bool checked = reading.in_mannequin;
-    if (!tools.has_probe || (!checked && probe_watch_.hold())) {
-        tools.has_probe = tools_.has_probe;
+    if (!checked && probe_watch_.hold()) tools.has_probe = tools_.has_probe;
+    if (!tools.has_probe || (!checked && probe_watch_.hold()))
         tools.mannequin_from_probe = tools_.mannequin_from_probe;
-    }
-    if (!checked && needle_watch_.hold()) {
-        tools.has_needle = tools_.has_needle;
+    if (!checked && needle_watch_.hold()) tools.has_needle = tools_.has_needle;
+    if (!tools.has_needle || (!checked && needle_watch_.hold()))
         tools.mannequin_from_needle = tools_.mannequin_from_needle;
-    }
     tools_ = tools;
 }
 
@@ -117,14 +147,19 @@ FrameStatus ScanEngine::frame(double now_s,
                               const ImageSettings& settings,
                               std::span<std::uint8_t> pixels) {
     FrameRecord record;
-    record.tools = tools_;
+    ToolPoses& tools = record.tools;
+    tools = tools_;
+    if (probe_watch_.lost(now_s)) tools.has_probe = false;
+    if (needle_watch_.lost(now_s)) tools.has_needle = false;
+    tools.probe_age_s = probe_watch_.age_s(now_s);
+    tools.needle_age_s = needle_watch_.age_s(now_s);
     record.reading_time_s = reading_.time_s;
     FrameInput& input = record.input;
-    input.mannequin_from_probe = tools_.mannequin_from_probe;
-    input.has_needle = tools_.has_needle;
+    input.mannequin_from_probe = tools.mannequin_from_probe;
+    input.has_needle = tools.has_needle;
     const double time_s = now_s - origin_s_;
-    if (tools_.has_needle) {
-        record.needle = needle_.update(time_s, tools_.mannequin_from_needle);
+    if (tools.has_needle) {
+        record.needle = needle_.update(time_s, tools.mannequin_from_needle);
         const Rigid& needle = record.needle.mannequin_from_drawn;
         input.needle.tip = needle * Point3{0, 0, 0};
         input.needle.direction = needle.rotation.column(2);
@@ -142,7 +177,7 @@ FrameStatus ScanEngine::frame(double now_s,
     }
     renderer_.press_probe(input);
     record.press = renderer_.press();
-    if (tools_.has_needle) {
+    if (tools.has_needle) {
         record.puncture = puncture_.update(time_s, input.needle.tip, input.needle.direction,
                                            record.needle.depth_mm, *anatomy_, renderer_);
         // Tissue yields to what is inserted.

@@ -44,10 +44,12 @@ struct ToolPoses {
     bool has_probe = false, has_needle = false;
     Rigid mannequin_from_probe;
     Rigid mannequin_from_needle;  // origin at the tip, z from hub to tip
+    // How long ago a device measured them; a tool that is lost keeps its last pose and is not `has`.
+    double probe_age_s = 0, needle_age_s = 0;
 };
 
 // Applies sensor_from_tool and world_from_mannequin (with its scale). A sensor that is absent or
-// lost yields no tool. Constant time.
+// lost, or whose pose is no number, yields no tool. Constant time.
 ToolPoses tool_poses(const TrackerReading& reading,
                      const Calibrations& calibrations,
                      const SensorAssignment& assignment);
@@ -86,7 +88,9 @@ class ScanEngine {
                                      const Exercise& exercise,
                                      const EngineOptions& options);
 
-    // Takes a new reading; the next frame shows it.
+    // Takes a new reading; the next frame shows it. A tool is lost, in the picture, the recording
+    // and the scores, once its own sensor has no pose to be believed (SensorWatch::lost), whatever
+    // the others say; so is one at exactly the identity among others, which senders give for none.
     void observe(const TrackerReading& reading, bool is_device);
     // Renders the frame of the last reading; pixels # width * height. Neither throws nor allocates.
     FrameStatus frame(double now_s, const ImageSettings& settings, std::span<std::uint8_t> pixels);
@@ -156,6 +160,8 @@ void fill_sample(const FrameRecord& record, Sample& sample) {
     sample.frame = record.input.frame;
     sample.probe_ok = record.tools.has_probe;
     sample.needle_ok = record.tools.has_needle;
+    sample.probe_age_s = record.tools.probe_age_s;
+    sample.needle_age_s = record.tools.needle_age_s;
     sample.mannequin_from_probe = record.tools.mannequin_from_probe;
     sample.mannequin_from_needle = record.tools.mannequin_from_needle;
     sample.mannequin_from_drawn = record.needle.mannequin_from_drawn;

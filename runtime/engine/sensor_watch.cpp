@@ -44,7 +44,8 @@ const char* verdict_sentence(SensorVerdict verdict) {
         case SensorVerdict::fine:
         case SensorVerdict::absent: return "";
         case SensorVerdict::lost:
-            return "Out of range: bring the sensor nearer to the transmitter.";
+            return "Out of view or out of range: bring the sensor back to where the tracker sees "
+                   "it.";
         case SensorVerdict::stale: return "No new reading: check the cable of the tracker.";
         case SensorVerdict::frozen:
             return "Frozen: readings arrive but never change; replug the sensor.";
@@ -55,13 +56,37 @@ const char* verdict_sentence(SensorVerdict verdict) {
     return "";
 }
 
-void SensorWatch::observe(const SensorReading& reading, double time_s, bool is_device) {
+void SensorWatch::observe(const SensorReading& reading,
+                          double arrived_s,
+                          bool is_device,
+                          bool others_moved) {
     device_ = is_device;
-    const bool usable = (reading.state == SensorState::ok || reading.state == SensorState::poor) &&
-                        is_finite(reading.world_from_sensor);
-    if (!seen_ || !(reading.world_from_sensor == last_.world_from_sensor)) changed_s_ = time_s;
+    const double time_s = reading.time_s >= 0 ? reading.time_s : arrived_s;
+    if (others_moved) ++others_;
+    // What another sensor's message brought along again is no reading of this one.
+    const bool again = seen_ && reading.time_s >= 0 && time_s == last_s_ &&
+                       reading.state == last_.state &&
+                       reading.world_from_sensor == last_.world_from_sensor;
+    if (again && reading.state != SensorState::absent) return;
+    usable_ = (reading.state == SensorState::ok || reading.state == SensorState::poor) &&
+              is_finite(reading.world_from_sensor);
+    if (!seen_ || !(reading.world_from_sensor == last_.world_from_sensor)) {
+        const double rest_s = time_s - changed_s_;
+        const double step =
+            norm(reading.world_from_sensor.translation - last_.world_from_sensor.translation);
+        if (seen_ && repeated_ && usable_ && step < 1) noiseless_ = true;
+        noisy_ = seen_ && rest_s <= options_.noisy_step_s
+                     ? std::min(noisy_ + 1, options_.noisy_readings)
+                     : 0;
+        changed_s_ = time_s;
+        others_ = 0;
+        repeated_ = false;
+    }
+    if (device_ && !noiseless_ && noisy_ >= options_.noisy_readings &&
+        others_ >= options_.repeated_readings && time_s - changed_s_ >= options_.repeated_after_s)
+        repeated_ = true;
     hold_ = false;
-    if (usable) {
+    if (usable_) {
         if (!seen_ || trusted_s_ < 0) {
             trusted_ = reading.world_from_sensor;
         } else {
@@ -82,17 +107,28 @@ void SensorWatch::observe(const SensorReading& reading, double time_s, bool is_d
                 trusted_ = reading.world_from_sensor;
             }
         }
-        if (!hold_) trusted_s_ = time_s;
+        if (!hold_) {
+            trusted_s_ = time_s;
+            const bool noise = noisy_ >= options_.noisy_readings && !noiseless_;
+            fresh_s_ = noise ? changed_s_ : time_s;
+        }
     }
     last_ = reading;
     last_s_ = time_s;
     seen_ = true;
 }
 
+bool SensorWatch::lost(double now_s) const {
+    return seen_ &&
+           (!usable_ || repeated_ || (device_ && now_s - last_s_ > options_.stale_after_s));
+}
+
 SensorVerdict SensorWatch::verdict(double now_s) const {
     if (!seen_ || last_.state == SensorState::absent) return SensorVerdict::absent;
-    if (device_ && now_s - last_s_ > options_.stale_after_s) return SensorVerdict::stale;
-    if (last_.state == SensorState::lost) return SensorVerdict::lost;
+    // Others go on: this one is out of view, not its tracker silent.
+    if (device_ && now_s - last_s_ > options_.stale_after_s)
+        return others_ >= options_.repeated_readings ? SensorVerdict::lost : SensorVerdict::stale;
+    if (!usable_ || repeated_) return SensorVerdict::lost;
     if (device_ && last_s_ - changed_s_ > options_.frozen_after_s) return SensorVerdict::frozen;
     if (now_s - jump_s_ < options_.jump_shown_s) return SensorVerdict::jumped;
     if (last_.state == SensorState::poor) return SensorVerdict::poor;

@@ -45,10 +45,15 @@ class ForceWatch {
 };
 
 struct SensorWatchOptions {
-    double stale_after_s = 0.25;   // no new reading
+    double stale_after_s = 0.25;   // no new reading of this sensor
     double frozen_after_s = 0.5;   // readings arrive, but no bit of the pose changes
     double top_speed_mm_s = 3000;  // faster than a hand moves a probe
     double jump_shown_s = 1.0;     // how long a jump stays on screen
+    // A sensor whose noise changed noisy_readings readings on end, each within noisy_step_s of the
+    // one before, is lost once its pose repeats to the last bit for repeated_after_s, while others
+    // change repeated_readings times: its sender goes on with the last pose.
+    int noisy_readings = 20, repeated_readings = 5;
+    double noisy_step_s = 0.1, repeated_after_s = 0.2;
 };
 
 enum class SensorVerdict : std::uint8_t { fine, absent, lost, stale, frozen, jumped, poor };
@@ -62,8 +67,17 @@ class SensorWatch {
     explicit SensorWatch(SensorWatchOptions options = {}) : options_(options) {}
     // Called with every reading. is_device: only hardware can be frozen or stale, or jump; see
     // Tracker::is_device.
-    void observe(const SensorReading& reading, double time_s, bool is_device);
+    // others_moved: the pose of another sensor has changed since the last call.
+    void observe(const SensorReading& reading,
+                 double time_s,
+                 bool is_device,
+                 bool others_moved = false);
     SensorVerdict verdict(double now_s) const;
+    // True if the sensor has no pose that can be believed now: its device says so, it is no number,
+    // it has been silent, or its sender repeats what it once was.
+    bool lost(double now_s) const;
+    // Of the pose last believed. 0 for what is no device: its poses are of the moment they are for.
+    double age_s(double now_s) const { return device_ && fresh_s_ >= 0 ? now_s - fresh_s_ : 0; }
     // True if the last observed pose should not be shown: a jump that no second reading has
     // confirmed yet. Two readings that agree are believed.
     bool hold() const { return hold_; }
@@ -71,10 +85,14 @@ class SensorWatch {
 
   private:
     SensorWatchOptions options_;
-    bool seen_ = false, device_ = false, hold_ = false;
+    bool seen_ = false, device_ = false, hold_ = false, usable_ = false, repeated_ = false;
+    // A source that rests to the last bit and goes on from there has no noise: a simulation.
+    bool noiseless_ = false;
+    int noisy_ = 0, others_ = 0;  // changes on end; of others since the last
     SensorReading last_;
     Rigid trusted_;
     double last_s_ = 0, changed_s_ = 0, jump_s_ = -1e9;
+    double fresh_s_ = -1;    // of the last pose that was measured and believed
     double trusted_s_ = -1;  // negative: no usable pose yet
     int jumps_ = 0;
 };

@@ -27,6 +27,10 @@ struct SensorReading {
     Rigid world_from_sensor;
     float quality = -1;        // [0, 1], 1 is best; negative: the device does not say
     std::uint8_t buttons = 0;  // bit 0: the first
+    // When this pose arrived, on the session's clock; negative: with the reading. A sender that
+    // reports its sensors one by one gives each its own, so that none vouches for another.
+    double time_s = -1;
+    bool in_mannequin = false;  // as TrackerReading's, of this sensor alone
 };
 
 // All sensors at one moment.

@@ -152,6 +152,11 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
     app.add_option("--calibration", arguments.calibrations,
                    "File of a calibration or a lag; may be repeated")
         ->allow_extra_args(false);
+    app.add_option("--tool", arguments.tools,
+                   "Which transform of an OpenIGTLink stream is which tool: "
+                   "probe|needle|reference=NAME; may be repeated. Default: by the names")
+        ->type_name("ROLE=NAME")
+        ->allow_extra_args(false);
     app.add_flag("--headless", arguments.headless, "No window: render frames and stop")
         ->group("Headless");
     app.add_option("--frames", arguments.frames,

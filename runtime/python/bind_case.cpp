@@ -70,7 +70,7 @@ std::string score_text(const OpenedCase& opened,
                        const std::optional<Exercise>& given) {
     const CaseBundle& bundle = bundle_of(opened);
     const py::gil_scoped_release free_to_run;
-    const Sequence sequence = value_of(load_sequence(session_path));
+    const Sequence sequence = value_of(load_recording_file(session_path));
     const Session session =
         value_of(session_from_sequence(sequence, guess_names(sequence), session_path));
     const Exercise exercise =
@@ -81,7 +81,7 @@ std::string score_text(const OpenedCase& opened,
 
 // Poses and times of a recorded session.
 py::dict read_session(const std::string& path) {
-    const Sequence sequence = value_of(load_sequence(path));
+    const Sequence sequence = value_of(load_recording_file(path));
     const Session session = value_of(session_from_sequence(sequence, guess_names(sequence), path));
     const auto count = static_cast<py::ssize_t>(session.samples.size());
     py::array_t<double> time_s(count), probe({count, py::ssize_t{4}, py::ssize_t{4}}),

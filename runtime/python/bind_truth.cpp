@@ -92,7 +92,9 @@ py::dict facts_of(const runtime::FrameTruth& truth,
     if (truth.has_needle) {
         facts["tip"] =
             py::dict("probe_mm"_a = array_of(truth.tip_probe), "in_plane"_a = truth.tip_in_plane,
-                     "label"_a = truth.tip_label, "shaft_in_image_mm"_a = truth.needle_in_image_mm,
+                     "visible"_a = truth.tip_visible, "label"_a = truth.tip_label,
+                     "shaft_in_image_mm"_a = truth.needle_in_image_mm,
+                     "shaft_visible_mm"_a = truth.needle_visible_mm,
                      "dent_mm"_a = py::make_tuple(truth.needle.tent_mm, truth.needle.drag_mm));
     }
     return facts;

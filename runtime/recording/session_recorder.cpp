@@ -102,6 +102,8 @@ struct SessionRecorder::Impl {
         sample.frame = f.frame;
         sample.probe_ok = f.probe_ok;
         sample.needle_ok = f.needle_ok;
+        sample.probe_age_s = f.probe_age_s;
+        sample.needle_age_s = f.needle_age_s;
         sample.mannequin_from_probe = f.mannequin_from_probe;
         sample.mannequin_from_needle = f.mannequin_from_needle;
         sample.mannequin_from_drawn = f.mannequin_from_drawn;

@@ -29,6 +29,7 @@ struct RecordedFrame {
     double time_s = 0;       // FrameInput::time_s
     std::int64_t frame = 0;  // FrameInput::frame
     bool probe_ok = false, needle_ok = false;
+    double probe_age_s = 0, needle_age_s = 0;
     Rigid mannequin_from_probe, mannequin_from_needle, mannequin_from_drawn;
     bool has_press = false;
     PressSample press;

@@ -9,6 +9,7 @@
 
 #include "formats/files/load_save.h"
 #include "formats/recording/sequence.h"
+#include "formats/recording/session.h"
 
 namespace sonocase::runtime::inline tracking {
 namespace {
@@ -20,18 +21,67 @@ SensorReading reading_of(const Pose& pose) {
     return reading;
 }
 
-Status check_times(const std::vector<Pose>& poses, const std::string& where) {
-    if (poses.empty()) {
-        return Error{"holds no pose", where, "a recording needs at least one row below its header"};
-    }
-    for (std::size_t i = 0; i < poses.size(); ++i) {
-        if (!std::isfinite(poses[i].timestamp_s) ||
-            (i > 0 && poses[i].timestamp_s < poses[i - 1].timestamp_s)) {
-            return Error{"time stamps do not rise at row " + std::to_string(i + 1), where,
-                         "sort the rows by timestamp_s"};
+double median_step_s(const std::vector<Pose>& poses) {
+    std::vector<double> steps;
+    for (std::size_t i = 1; i < poses.size(); ++i)
+        steps.push_back(poses[i].timestamp_s - poses[i - 1].timestamp_s);
+    if (steps.empty()) return 0;
+    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+    std::nth_element(steps.begin(), middle, steps.end());
+    return *middle;
+}
+
+// How far a reading of the needle may be from the probe's: a step of the slower, and no longer than
+// a live tool may be silent.
+double reach_s(const Recording& recording) {
+    return std::clamp(std::max(median_step_s(recording.probe), median_step_s(recording.needle)),
+                      0.05, 0.25);
+}
+
+// # probe: index of the needle's reading that is nearest in time; # needle where none is in reach.
+std::vector<std::size_t> nearest_needles(const Recording& recording) {
+    const auto& needle = recording.needle;
+    const double reach = reach_s(recording) + 1e-6;  // sums of printed times round
+    std::vector<std::size_t> nearest;
+    std::size_t j = 0;
+    for (const Pose& pose : recording.probe) {
+        while (j + 1 < needle.size() && std::abs(needle[j + 1].timestamp_s - pose.timestamp_s) <=
+                                            std::abs(needle[j].timestamp_s - pose.timestamp_s)) {
+            ++j;
         }
+        const bool near =
+            j < needle.size() && std::abs(needle[j].timestamp_s - pose.timestamp_s) <= reach;
+        nearest.push_back(near ? j : needle.size());
     }
-    return Done{};
+    return nearest;
+}
+
+// Leaves out readings whose time falls or is no number; returns their number.
+std::size_t drop_falling(std::vector<Pose>& poses) {
+    std::vector<Pose> kept;
+    kept.reserve(poses.size());
+    for (const Pose& pose : poses) {
+        if (!std::isfinite(pose.timestamp_s) ||
+            (!kept.empty() && pose.timestamp_s < kept.back().timestamp_s))
+            continue;
+        kept.push_back(pose);
+    }
+    const std::size_t dropped = poses.size() - kept.size();
+    poses = std::move(kept);
+    return dropped;
+}
+
+Status check_places(const std::vector<Pose>& poses, const std::string& where) {
+    double farthest = 0;
+    int counted = 0;
+    for (const Pose& pose : poses) {
+        if (!pose.ok) continue;
+        ++counted;
+        farthest = std::max(farthest, norm(pose.tracker_from_tool.translation));
+    }
+    if (counted <= 10 || !(farthest < 2)) return Done{};
+    return Error{"no pose lies farther than 2 mm from the origin", where,
+                 "expected millimetres; these look like metres: multiply them by 1000"};
 }
 
 bool ends_with(const std::string& text, const char* ending) {
@@ -41,9 +91,10 @@ bool ends_with(const std::string& text, const char* ending) {
 }
 
 // Index of the transform of a tool, by its name before "To"; -1: none. One to the mannequin is
-// preferred, then one to the tracker, then any.
+// preferred, then one to the tracker, then any; then one whose name holds the tool's.
 int transform_of(const Sequence& sequence,
                  const std::vector<std::string>& tools,
+                 const std::string& guessed,
                  bool& in_mannequin) {
     int best = -1, best_rank = 0;
     for (std::size_t i = 0; i < sequence.transforms.size(); ++i) {
@@ -56,57 +107,30 @@ int transform_of(const Sequence& sequence,
             if (rank > best_rank) best = static_cast<int>(i), best_rank = rank;
         }
     }
-    in_mannequin = best_rank == 3;
+    if (best < 0) best = sequence.transform_index(guessed);
+    in_mannequin =
+        best >= 0 && ends_with(sequence.transforms[static_cast<std::size_t>(best)], "ToMannequin");
     return best;
 }
 
-std::vector<Pose> poses_of(const Sequence& sequence, int transform) {
-    std::vector<Pose> poses;
-    for (const SequenceFrame& frame : sequence.frames) {
-        Pose pose;
-        pose.frame = frame.number;
-        pose.timestamp_s = frame.timestamp_s;
-        const SequencePose& read = frame.poses[transform];
-        const std::optional<Rigid> rigid = rigid_from_matrix(read.to_from);
-        pose.ok = read.ok && rigid;
-        if (rigid) pose.tracker_from_tool = *rigid;
-        poses.push_back(pose);
+// The readings as they are replayed: those that are no rigid motion count as lost.
+std::vector<Pose> readings_of(const Sequence& sequence, int transform) {
+    std::vector<Pose> poses = poses_of(sequence, transform);
+    for (Pose& pose : poses) {
+        const std::optional<Rigid> rigid =
+            rigid_from_matrix(matrix_from_rigid(pose.tracker_from_tool));
+        pose.ok = pose.ok && rigid;
+        if (!rigid) pose.tracker_from_tool = {};
     }
     return poses;
-}
-
-Result<Recording> recording_of_sequence(const std::string& path) {
-    SONOCASE_TRY(Sequence sequence, load_sequence(path));
-    Recording recording;
-    bool probe_home = false, needle_home = false;
-    const int probe = transform_of(sequence, {"Probe", "Transducer", "Image"}, probe_home);
-    const int needle = transform_of(sequence, {"Needle", "Stylus"}, needle_home);
-    if (probe < 0) {
-        std::string names;
-        for (const std::string& name : sequence.transforms) names += " " + name;
-        return Error{"no transform of a probe; found" + (names.empty() ? " none" : ":" + names),
-                     path, "expected ProbeToTracker or ProbeToMannequin"};
-    }
-    recording.probe = poses_of(sequence, probe);
-    recording.in_mannequin = probe_home;
-    if (needle >= 0 && needle_home == probe_home) recording.needle = poses_of(sequence, needle);
-    return recording;
 }
 
 }  // namespace
 
 ReplayTracker::ReplayTracker(Recording recording, bool loop)
-    : recording_(std::move(recording)), loop_(loop) {
-    const auto& needle = recording_.needle;
-    std::size_t j = 0;
-    for (const Pose& pose : recording_.probe) {
-        while (j + 1 < needle.size() && std::abs(needle[j + 1].timestamp_s - pose.timestamp_s) <=
-                                            std::abs(needle[j].timestamp_s - pose.timestamp_s)) {
-            ++j;
-        }
-        needle_of_probe_.push_back(j);
-    }
-}
+    : recording_(std::move(recording)),
+      needle_of_probe_(nearest_needles(recording_)),
+      loop_(loop) {}
 
 double ReplayTracker::duration_s() const {
     return recording_.probe.back().timestamp_s - recording_.probe.front().timestamp_s;
@@ -154,7 +178,12 @@ bool ReplayTracker::poll(double now_s, TrackerReading& reading) {
     reading.sensors[kProbeSensor] = reading_of(probe[i]);
     if (!probe[i].ok) ++not_ok_;
     if (!recording_.needle.empty()) {
-        reading.sensors[kNeedleSensor] = reading_of(recording_.needle[needle_of_probe_[i]]);
+        const std::size_t j = needle_of_probe_[i];
+        if (j < recording_.needle.size()) {
+            reading.sensors[kNeedleSensor] = reading_of(recording_.needle[j]);
+        } else {
+            reading.sensors[kNeedleSensor].state = SensorState::lost;
+        }
     }
     return true;
 }
@@ -165,6 +194,7 @@ TrackerHealth ReplayTracker::health() const {
     health.device = "Replay of " + recording_.name;
     health.readings = sequence_;
     health.bad_frames = not_ok_;
+    health.message = recording_.note;
     const double duration = duration_s();
     if (duration > 0) {
         health.rate_hz = static_cast<double>(recording_.probe.size() - 1) / duration;
@@ -172,25 +202,49 @@ TrackerHealth ReplayTracker::health() const {
     return health;
 }
 
-Result<Recording> load_recording(const std::string& files) {
+Result<Recording> load_recording(const std::string& files, double needle_lag_s) {
+    SONOCASE_TRY(const Sequence sequence, load_recording_file(files));
     Recording recording;
-    const std::size_t comma = files.find(',');
-    const std::string probe_file = files.substr(0, comma);
-    if (ends_with(probe_file, ".mha") || ends_with(probe_file, ".nrrd")) {
-        SONOCASE_TRY(Recording whole, recording_of_sequence(probe_file));
-        SONOCASE_TRY_DONE(check_times(whole.probe, probe_file));
-        whole.name = probe_file.substr(probe_file.find_last_of('/') + 1);
-        return whole;
+    recording.name = files.substr(0, files.find(','));
+    recording.name = recording.name.substr(recording.name.find_last_of('/') + 1);
+    const SessionNames guessed = guess_names(sequence);
+    bool probe_home = false, needle_home = false;
+    const int probe =
+        transform_of(sequence, {"Probe", "Transducer", "Image"}, guessed.probe, probe_home);
+    const int needle = transform_of(sequence, {"Needle", "Stylus"}, guessed.needle, needle_home);
+    if (probe < 0) {
+        std::string names;
+        for (const std::string& name : sequence.transforms) names += " " + name;
+        return Error{"no transform of a probe; found" + (names.empty() ? " none" : ":" + names),
+                     files, "expected ProbeToTracker or ProbeToMannequin"};
     }
-    recording.name = probe_file.substr(probe_file.find_last_of('/') + 1);
-    SONOCASE_TRY(std::vector<Pose> probe, load_poses(probe_file));
-    recording.probe = std::move(probe);
-    SONOCASE_TRY_DONE(check_times(recording.probe, probe_file));
-    if (comma != std::string::npos) {
-        const std::string needle_file = files.substr(comma + 1);
-        SONOCASE_TRY(std::vector<Pose> needle, load_poses(needle_file));
-        recording.needle = std::move(needle);
-        SONOCASE_TRY_DONE(check_times(recording.needle, needle_file));
+    recording.probe = readings_of(sequence, probe);
+    recording.in_mannequin = probe_home;
+    if (needle >= 0 && needle_home == probe_home) recording.needle = readings_of(sequence, needle);
+    if (recording.probe.empty())
+        return Error{"holds no pose", files, "a recording needs at least one row below its header"};
+    if (!has_times(recording.probe) || !has_times(recording.needle))
+        return Error{"its readings have no times, or all the same", files,
+                     "a replay needs them: record with time stamps in seconds"};
+    SONOCASE_TRY_DONE(check_places(recording.probe, files));
+    if (!recording.in_mannequin) {
+        for (Pose& pose : recording.needle) pose.timestamp_s -= needle_lag_s;
+    }
+    const std::size_t readings = recording.probe.size() + recording.needle.size();
+    const std::size_t dropped = drop_falling(recording.probe) + drop_falling(recording.needle);
+    if (recording.probe.empty()) return Error{"holds no time that is a number", files, ""};
+    if (dropped > 0)
+        recording.note =
+            Message("{} of {} readings were left out, because their time fell or was no number.",
+                    {std::to_string(dropped), std::to_string(readings)});
+    if (!recording.needle.empty()) {
+        const std::vector<std::size_t> nearest = nearest_needles(recording);
+        if (std::all_of(nearest.begin(), nearest.end(),
+                        [&](std::size_t j) { return j == recording.needle.size(); })) {
+            return Error{
+                "no reading of the needle is at the time of one of the probe", files,
+                "both must be on one clock, or their lag be given: --calibration LAG.json"};
+        }
     }
     return recording;
 }

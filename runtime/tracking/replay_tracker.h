@@ -20,6 +20,7 @@ struct Recording {
     std::vector<Pose> probe;   // times increasing; at least one
     std::vector<Pose> needle;  // matched to the probe by time; may be empty
     bool in_mannequin = false;
+    Message note;  // what was left out, for the user; empty: nothing
 };
 
 class ReplayTracker final : public Tracker {
@@ -34,7 +35,8 @@ class ReplayTracker final : public Tracker {
 
   private:
     Recording recording_;
-    std::vector<std::size_t> needle_of_probe_;  // nearest in time
+    // Nearest in time; none within reach: # needle readings.
+    std::vector<std::size_t> needle_of_probe_;
     bool loop_;
     bool started_ = false;
     double start_s_ = 0, next_s_ = -1;
@@ -44,9 +46,13 @@ class ReplayTracker final : public Tracker {
     bool over_ = false;
 };
 
-// Reads poses to replay. `files` is one CSV of the probe, or two joined by a comma, probe and
-// needle (formats/recording/poses.h), or one IGSIO sequence. Times must increase and be finite.
-Result<Recording> load_recording(const std::string& files);
+// Reads poses to replay: what load_recording_file() reads (formats/files/load_save.h). Readings
+// whose time falls or is no number are left out, and noted. needle_lag_s is taken from the needle's
+// times unless they were recorded in the mannequin. The needle is lost where it has no reading near
+// in time.
+// Errors: no times; places in metres; no needle's reading at the time of any of the probe's, as of
+// two clocks.
+Result<Recording> load_recording(const std::string& files, double needle_lag_s = 0);
 
 // A recording or script at another speed, or from another place: for the tracker inside, time runs
 // faster or slower, or jumps. Speed and place are set from any thread; one thread polls.

@@ -79,8 +79,24 @@ Passed expert(const Case& of, const Exercise& exercise, int attempts) {
     return out;
 }
 
+// Whoever copies the script that shows how an exercise is done passes it.
+void expect_scripts_pass(const Case& of) {
+    for (const Exercise& exercise : of.exercises) {
+        const CaseAnatomy at_rest(of.bundle), breathing(of.bundle, exercise.breathing);
+        Attempt attempt(of.bundle, at_rest, breathing, exercise, 0);
+        testing::play_script(attempt, "needle", 120);
+        if (attempt.session.samples.empty()) continue;  // it has no script with a needle
+        for (const PassResult& mark : attempt.score().pass_marks) {
+            std::printf("%-18s script: %-32s %8.3g %s\n", exercise.name.c_str(),
+                        mark.metric.c_str(), mark.value, mark.passed ? "" : "MISSED");
+            EXPECT_TRUE(mark.passed) << exercise.name << ": " << mark.metric << " = " << mark.value;
+        }
+    }
+}
+
 // bluffs: spread over the exercises. expert_attempts: at each of them.
 void expect_honest(const Case& of, int bluffs, int expert_attempts) {
+    expect_scripts_pass(of);
     const int each = bluffs / static_cast<int>(of.exercises.size());
     Passed all_bluffs, all_experts;
     for (const Exercise& exercise : of.exercises) {

@@ -9,6 +9,7 @@
 #include "formats/base/constants.h"
 #include "formats/scoring/sight.h"
 #include "formats/volume/tissue.h"
+#include "runtime/tracking/scripted_sweep.h"
 
 namespace sonocase::testing {
 
@@ -62,15 +63,36 @@ void bluff_with_a_straight_push(Attempt& a, Random& random) {
     for (int i = 0; i < 10; ++i) a.tick();
 }
 
+void play_script(Attempt& a, const std::string& name, int readings) {
+    for (const Sweep& sweep : a.exercise.sweeps) {
+        if (sweep.name != name) continue;
+        const double first_s = sweep.keys.front().time_s;
+        const double step_s = (sweep.keys.back().time_s - first_s) / (readings - 1);
+        for (int i = 0; i < readings; ++i) {
+            const runtime::SweepPose pose =
+                runtime::sweep_pose(sweep, first_s + i * step_s, &a.skin);
+            SessionSample sample;
+            sample.time_s = i * step_s;
+            sample.probe_ok = true;
+            sample.mannequin_from_probe = pose.mannequin_from_probe;
+            sample.needle_ok = pose.has_needle;
+            if (pose.has_needle) {
+                sample.mannequin_from_needle = pose.mannequin_from_needle;
+                sample.mannequin_from_drawn =
+                    a.needle.update(sample.time_s, pose.mannequin_from_needle).mannequin_from_drawn;
+            }
+            a.session.samples.push_back(sample);
+        }
+    }
+}
+
 namespace {
 
 // What the expert sees and aims at.
 class Expert {
   public:
-    explicit Expert(Attempt& attempt) : a_(attempt) {
+    explicit Expert(Attempt& attempt) : a_(attempt), sight_(&attempt.anatomy, attempt.exercise) {
         const Exercise& e = a_.exercise;
-        const double slab = e.needle.slab_mm > 0 ? e.needle.slab_mm : needle_diameter_mm(e.needle);
-        half_slab_mm_ = 0.5 * std::max(slab, e.probe.elevation_mm);
         for (std::size_t i = 0; i < a_.bundle.labels.size(); ++i) {
             no_go_[i] = std::find(e.no_go.begin(), e.no_go.end(), a_.bundle.labels[i].name) !=
                         e.no_go.end();
@@ -266,15 +288,13 @@ class Expert {
             }
         }
         const Rigid pose = hands.mannequin_from_probe(), back = inverse(pose);
-        const double seen = visible_length(a_.anatomy, a_.exercise.probe, pose, back * end,
-                                           back * entry, half_slab_mm_, 0) /
-                            depth;
+        const double seen = sight_.visible_mm(pose, back * end, back * entry, 0) / depth;
         if (plan_ && plan_->visible >= seen) return;
         plan_.emplace(ExpertPlan{hands, depth, seen});
     }
 
     Attempt& a_;
-    double half_slab_mm_ = 0;
+    NeedleSight sight_;
     std::array<bool, 256> no_go_{};
     int vessel_ = -1;  // label that the target lies in; -1: no vessel
     std::optional<ExpertPlan> plan_;

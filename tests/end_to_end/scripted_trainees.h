@@ -81,6 +81,10 @@ void bluff_with_a_random_walk(Attempt& attempt, Random& random);
 // From where the attempt begins straight in, to a random depth.
 void bluff_with_a_straight_push(Attempt& attempt, Random& random);
 
+// The exercise's own script of that name, in as many readings from its first key to its last as
+// the player's --frames would take.
+void play_script(Attempt& attempt, const std::string& sweep, int readings);
+
 // What the expert has found, and not yet done: the probe over the target, the needle beside it and
 // aimed at it.
 struct ExpertPlan {

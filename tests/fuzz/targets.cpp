@@ -6,6 +6,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -20,10 +21,14 @@
 #include "formats/machine/machine.h"
 #include "formats/recording/poses.h"
 #include "formats/recording/sequence.h"
+#include "formats/recording/transform_log.h"
 #include "formats/text/stage_report_json.h"
 #include "pipeline/anatomy/label_table.h"
 #include "pipeline/base/point_table.h"
 #include "pipeline/import/mesh/polygon_file.h"
+#include "pipeline/import/volume/dicom_frames.h"
+#include "pipeline/import/volume/dicom_segmentation.h"
+#include "pipeline/import/volume/nifti_file.h"
 #include "pipeline/import/volume/volume_header.h"
 #include "pipeline/registration/map/registration.h"
 #include "runtime/tracking/devices/guidance_protocol.h"
@@ -163,9 +168,14 @@ void poses(Bytes bytes) {
 }
 
 void sequence(Bytes bytes) {
-    const auto read = read_sequence(bytes, "fuzz");
+    const std::string_view text = text_of(bytes);
+    (void)pixel_file_of(bytes);
+    const auto read = looks_like_transform_log(text) ? parse_transform_log(text, "fuzz")
+                                                     : read_sequence(bytes, "fuzz");
     check_error(read);
     if (!read) return;
+    for (int t = 0; t < static_cast<int>(read->transforms.size()); ++t)
+        demand(poses_of(*read, t).size() <= read->frames.size());
     for (const SequenceFrame& frame : read->frames) {
         demand(frame.poses.size() == read->transforms.size());
         for (const SequencePose& pose : frame.poses) rigid_from_matrix(pose.to_from);
@@ -196,9 +206,75 @@ void nifti_extension(Bytes bytes) {
     check_error(pipeline::load_nifti_label_table(file.path()));
 }
 
+// What a header places is finite, or an error says why not.
+void check_placement(const Result<pipeline::Placement>& read) {
+    check_error(read);
+    if (!read) return;
+    pipeline::NativeVolume volume;
+    check_error(pipeline::place_volume(*read, {}, "fuzz", volume));
+    for (const double entry : read->columns.m) demand(std::isfinite(entry));
+    for (int axis = 0; axis < 3; ++axis) {
+        demand(std::isfinite(read->origin_mm[axis]));
+        demand(read->size[axis] >= 1 && read->size[axis] <= 65535);
+    }
+}
+
+void volume_headers(Bytes bytes) {
+    for (const auto orientation : {pipeline::Orientation::automatic, pipeline::Orientation::sform,
+                                   pipeline::Orientation::qform}) {
+        const auto header = pipeline::parse_nifti_header(bytes, "fuzz", orientation);
+        check_error(header);
+        if (header) check_placement(header->placement);
+    }
+    check_placement(pipeline::nrrd_placement(text_of(bytes), "fuzz"));
+    check_placement(pipeline::meta_placement(text_of(bytes), "fuzz"));
+    const MemoryFile file(bytes);
+    check_error(pipeline::read_nifti_volume(file.path(), {}));
+}
+
 void label_tables(Bytes bytes) {
-    check_error(pipeline::parse_label_csv(text_of(bytes), "fuzz"));
+    check_error(pipeline::parse_label_table(text_of(bytes), "fuzz"));
     check_error(pipeline::parse_label_xml(text_of(bytes), "fuzz"));
+}
+
+// The elements of a DICOM file, whatever it holds.
+void dicom_header(Bytes bytes) {
+    const MemoryFile file(bytes);
+    const auto header = pipeline::read_dicom_header(file.path());
+    if (!header) return;
+    demand(header->pixels_at <= header->size || header->cut_off(0));
+    for (const pipeline::DicomTag tag : {0x00620002u, 0x00620001u, 0x00280010u, 0x00081115u}) {
+        pipeline::text_of(header->set, tag);
+        pipeline::whole_of(header->set, tag);
+        for (const pipeline::DicomSet& item : pipeline::items_of(header->set, tag))
+            pipeline::shorts_of(item, 0x0062000d);
+    }
+    const auto frames = pipeline::frames_of(
+        header->set, std::max(1, std::min(1000, pipeline::whole_of(header->set, 0x00280008))));
+    for (const pipeline::DicomFrame& frame : frames) {
+        if (!frame.placed() || !frame.fault.empty()) continue;
+        demand(std::isfinite(frame.position.x + frame.position.y + frame.position.z));
+        demand(std::abs(norm(frame.normal()) - 1) < 1e-9);
+        demand(frame.row_spacing_mm >= 0 && std::isfinite(frame.thickness_mm));
+    }
+}
+
+// Runs of packed bits are those that are found bit by bit.
+void packed_bits(Bytes bytes) {
+    if (bytes.size() < 4) return;
+    const std::size_t bits = 8 * (bytes.size() - 3);
+    const std::size_t first = (bytes[0] + 256u * bytes[1]) % bits;
+    const std::size_t count = std::min<std::size_t>(bits - first, 8u * bytes[2]);
+    const std::uint8_t* from = bytes.data() + 3;
+    std::vector<bool> inside(count, false);
+    std::size_t next = 0;
+    pipeline::for_bit_runs(from, first, count, [&](std::size_t start, std::size_t length) {
+        demand(length > 0 && start >= next && start + length <= count);
+        next = start + length + 1;
+        std::fill_n(inside.begin() + static_cast<std::ptrdiff_t>(start), length, true);
+    });
+    for (std::size_t n = 0; n < count; ++n)
+        demand(inside[n] == (((from[(first + n) / 8] >> ((first + n) % 8)) & 1) != 0));
 }
 
 void ply(Bytes bytes) {
@@ -301,8 +377,11 @@ void openigtlink(Bytes bytes) {
         g::Header header;
         header.type = type;
         header.body_size = bytes.size() - 1;
-        for (const g::NamedPose& pose : g::parse_poses(header, bytes.subspan(1)))
-            demand(is_finite(pose.to_from));
+        for (const std::uint16_t version : {1, 2}) {  // 2: with metadata
+            header.version = version;
+            for (const g::NamedPose& pose : g::parse_poses(header, bytes.subspan(1)))
+                demand(is_finite(pose.to_from));
+        }
     }
 }
 
@@ -332,7 +411,10 @@ const std::vector<Target>& targets() {
         {"registration", registration},
         {"stage_report", stage_report},
         {"nifti_extension", nifti_extension},
+        {"volume_headers", volume_headers},
         {"label_tables", label_tables},
+        {"dicom_header", dicom_header},
+        {"packed_bits", packed_bits},
         {"ply", ply},
         {"stl", stl},
         {"vtk", vtk},

@@ -47,6 +47,15 @@ def test_the_same_seed_and_actions_give_the_same_episode(case):
     assert any((a != b).any() for a, b in zip(first, run(1, 5)))
 
 
+def test_reset_without_a_seed_begins_elsewhere_each_time(case):
+    env = Environment(case, "find-view", size=(32, 32), seed=3)
+    begun = [env.reset()[0].tobytes() for _ in range(5)]
+    assert len(set(begun)) == 5
+    assert env.reset(seed=7)[0].tobytes() == env.reset(seed=7)[0].tobytes()
+    assert env.reset(seed=3)[0].tobytes() == begun[0]
+    assert env.reset()[0].tobytes() == begun[1]
+
+
 def test_several_cases_take_turns(case, small):
     other = sonocase.Case.open(small[0])
     env = VectorEnvironment([case, other], "find-view", 3, size=(40, 40))

@@ -14,6 +14,7 @@ namespace sonocase::pipeline::inline import_body {
 struct MeshImportOptions {
     MeshOptions mesh;
     BodyOptions body;
+    std::string anatomy = "check";  // of label maps as well: refuse what is no body, or "accept"
 };
 
 inline constexpr int kMeshImportVersion = 3;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// DICOM series: headers, the order of the slices, and their pixels through ITK.
+// DICOM files and folders: headers, the order of the slices, and their pixels through ITK.
 
 #include "pipeline/import/volume/dicom_series.h"
 
@@ -12,15 +12,18 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <tuple>
 
+#include <gdcmBitmap.h>
 #include <gdcmReader.h>
 #include <itkGDCMImageIO.h>
 #include <itkObject.h>
 
+#include "formats/base/constants.h"
 #include "formats/text/number_text.h"
 #include "pipeline/base/quiet_library.h"
 #include "pipeline/base/text.h"
+#include "pipeline/import/volume/dicom_frames.h"
+#include "pipeline/import/volume/dicom_segmentation.h"
 #include "pipeline/import/volume/itk_component.h"
 #include "pipeline/import/volume/native_volume.h"
 
@@ -30,64 +33,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const gdcm::Tag kThickness(0x18, 0x50), kSeries(0x20, 0xe), kAcquisition(0x20, 0x12),
-    kNumber(0x20, 0x13), kPosition(0x20, 0x32), kOrientation(0x20, 0x37),
-    kInAcquisition(0x20, 0x1002), kInSeries(0x20, 0x1209), kSamples(0x28, 2), kFrames(0x28, 8),
-    kRows(0x28, 0x10), kColumns(0x28, 0x11), kBits(0x28, 0x100), kSlices(0x54, 0x81),
-    kPixels(0x7fe0, 0x10);
+constexpr DicomTag kImageType = 0x00080008, kSopClass = 0x00080016, kModality = 0x00080060,
+                   kDescription = 0x0008103e, kReferencedSeries = 0x00081115, kSeries = 0x0020000e,
+                   kAcquisition = 0x00200012, kNumber = 0x00200013, kFrameOfReference = 0x00200052,
+                   kInAcquisition = 0x00201002, kInSeries = 0x00201209, kSamples = 0x00280002,
+                   kFrames = 0x00280008, kRows = 0x00280010, kColumns = 0x00280011,
+                   kBits = 0x00280100, kSlices = 0x00540081;
 
-// The bytes of an element, without the padding; empty where there is none.
-std::string value_of(const gdcm::DataSet& set, const gdcm::Tag& tag) {
-    if (!set.FindDataElement(tag)) return {};
-    const gdcm::ByteValue* bytes = set.GetDataElement(tag).GetByteValue();
-    if (bytes == nullptr) return {};
-    return {bytes->GetPointer(), bytes->GetLength()};
-}
-
-std::string text_of(const gdcm::DataSet& set, const gdcm::Tag& tag) {
-    std::string text = value_of(set, tag);
-    while (!text.empty() && (text.back() == ' ' || text.back() == '\0')) text.pop_back();
-    text.erase(0, std::min(text.find_first_not_of(' '), text.size()));
-    return text;
-}
-
-// An element of 16 bits; GDCM has turned its bytes to this machine's order.
-int short_of(const gdcm::DataSet& set, const gdcm::Tag& tag) {
-    const std::string bytes = value_of(set, tag);
-    std::uint16_t value = 0;
-    if (bytes.size() >= 2) std::memcpy(&value, bytes.data(), 2);
-    return value;
-}
-
-int whole_of(const gdcm::DataSet& set, const gdcm::Tag& tag) {
-    double value = 0;
-    if (!parse_number(text_of(set, tag), value) || !(value > 0 && value < 1e6)) return 0;
-    return static_cast<int>(value);
-}
-
-// Numbers between backslashes; false unless there are as many as wanted.
-bool numbers_of(const std::string& text, double* numbers, int wanted) {
-    std::size_t at = 0;
-    for (int n = 0; n < wanted; ++n) {
-        if (at > text.size()) return false;
-        const std::size_t end = std::min(text.find('\\', at), text.size());
-        std::string one = text.substr(at, end - at);
-        one.erase(0, std::min(one.find_first_not_of(" +"), one.size()));
-        while (!one.empty() && one.back() == ' ') one.pop_back();
-        if (!parse_number(one, numbers[n])) return false;
-        at = end + 1;
-    }
-    return true;
-}
-
-DicomSlice slice_of(const gdcm::DataSet& set) {
+DicomSlice slice_of(const DicomSet& set) {
     DicomSlice slice;
     slice.series = text_of(set, kSeries);
     slice.acquisition = text_of(set, kAcquisition);
-    slice.thickness = text_of(set, kThickness);
+    slice.modality = text_of(set, kModality);
+    slice.description = text_of(set, kDescription);
+    slice.frame_of_reference = text_of(set, kFrameOfReference);
     slice.rows = short_of(set, kRows);
     slice.columns = short_of(set, kColumns);
-    slice.frames = std::max(1, whole_of(set, kFrames));
+    slice.frames = frames_of(set, std::max(1, whole_of(set, kFrames)));
     slice.number = whole_of(set, kNumber);
     slice.declared = whole_of(set, kInSeries);
     if (slice.declared == 0) slice.declared = short_of(set, kSlices);
@@ -95,65 +57,112 @@ DicomSlice slice_of(const gdcm::DataSet& set) {
         slice.declared = whole_of(set, kInAcquisition);
         slice.declared_for_acquisition = true;
     }
-    double at[3], along[6];
-    slice.placed = numbers_of(text_of(set, kPosition), at, 3) &&
-                   numbers_of(text_of(set, kOrientation), along, 6);
-    if (slice.placed) {
-        slice.position = {at[0], at[1], at[2]};
-        slice.along_rows = {along[0], along[1], along[2]};
-        slice.along_columns = {along[3], along[4], along[5]};
-    }
     return slice;
 }
 
 // Whether the file ends before its pixels do. GDCM reads such a file and leaves the rest as zeros.
-// Pixels that are compressed say so themselves.
-bool is_cut_off(const gdcm::Reader& reader, const std::string& path, const DicomSlice& slice) {
-    const gdcm::File& dicom = reader.GetFile();
-    const gdcm::TransferSyntax syntax = dicom.GetHeader().GetDataSetTransferSyntax();
-    if (syntax.IsEncapsulated() || syntax == gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian)
-        return false;
-    const gdcm::DataSet& set = dicom.GetDataSet();
-    const std::uint64_t bits = static_cast<std::uint64_t>(slice.rows) *
-                               static_cast<std::uint64_t>(slice.columns) *
-                               static_cast<std::uint64_t>(std::max(1, slice.frames)) *
-                               static_cast<std::uint64_t>(std::max(1, short_of(set, kSamples))) *
-                               static_cast<std::uint64_t>(short_of(set, kBits));
-    std::uint64_t at = reader.GetStreamCurrentPosition();
-    std::ifstream file(path, std::ios::binary);
-    char tag[8] = {};
-    file.seekg(static_cast<std::streamoff>(at));
-    if (file.read(tag, sizeof tag) && std::memcmp(tag, "\xe0\x7f\x10\x00", 4) == 0)
-        at += tag[4] == 'O' ? 12 : 8;  // with its kind, or without
-    std::error_code code;
-    return fs::file_size(path, code) < at + bits / 8;
+bool is_cut_off(const DicomHeader& header) {
+    const auto count = [&](DicomTag tag) {
+        return static_cast<std::uint64_t>(std::max(1, short_of(header.set, tag)));
+    };
+    const std::uint64_t bits =
+        count(kRows) * count(kColumns) * count(kSamples) * count(kBits) *
+        static_cast<std::uint64_t>(std::max(1, whole_of(header.set, kFrames)));
+    return !header.has_pixels || header.cut_off((bits + 7) / 8);
+}
+
+bool is_one_of(const std::string& text, std::initializer_list<const char*> texts) {
+    return std::any_of(texts.begin(), texts.end(), [&](const char* one) { return text == one; });
+}
+
+DicomObject object_of(const DicomSet& set, const std::string& path) {
+    DicomObject object;
+    object.path = path;
+    object.modality = text_of(set, kModality);
+    object.frame_of_reference = text_of(set, kFrameOfReference);
+    const std::vector<DicomSet> series = items_of(set, kReferencedSeries);
+    if (!series.empty()) object.series = text_of(series.front(), kSeries);
+    return object;
+}
+
+// Puts one file where it belongs.
+void add_file(const std::string& path, DicomFolder& folder) {
+    const auto header = read_dicom_header(path);
+    if (!header) {
+        if (is_dicom_file(path)) folder.damaged.push_back(path);
+        return;
+    }
+    const DicomSet& set = header->set;
+    const std::string type = text_of(set, kSopClass);
+    DicomObject object = object_of(set, path);
+    if (type.starts_with("1.2.840.10008.5.1.4.1.1.66.") || object.modality == "SEG") {
+        object.cut_off = is_cut_off(*header);
+        folder.segmentations.push_back(std::move(object));
+        return;
+    }
+    if (type == "1.2.840.10008.5.1.4.1.1.481.3" || object.modality == "RTSTRUCT") {
+        folder.structure_sets.push_back(std::move(object));
+        return;
+    }
+    const bool has_pixels = short_of(set, kRows) > 0 && short_of(set, kColumns) > 0;
+    if (!has_pixels && is_one_of(object.modality, {"CT", "MR"})) {
+        folder.damaged.push_back(path);
+        return;
+    }
+    const bool localizer = text_of(set, kImageType).find("LOCALIZER") != std::string::npos;
+    if (!has_pixels || localizer ||
+        is_one_of(object.modality, {"PT", "NM", "RTDOSE", "RTIMAGE", "US", "XA", "CR", "DX"})) {
+        if (localizer) object.modality += " localizer";
+        if (!object.modality.empty()) folder.others.push_back(std::move(object));
+        return;
+    }
+    DicomSlice slice = slice_of(set);
+    slice.path = path;
+    slice.cut_off = is_cut_off(*header);
+    folder.slices.push_back(std::move(slice));
 }
 
 }  // namespace
 
-std::vector<DicomSlice> read_dicom_headers(const std::string& folder) {
+DicomFolder read_dicom_headers(const std::string& path) {
     std::vector<std::string> paths;
     std::error_code code;
-    for (const auto& entry : fs::directory_iterator(folder, code))
-        if (entry.is_regular_file(code)) paths.push_back(entry.path().string());
-    std::sort(paths.begin(), paths.end());  // a folder lists its files in no fixed order
-    const QuietLibrary quiet;
-    std::vector<DicomSlice> slices;
-    for (const std::string& path : paths) {
-        try {
-            gdcm::Reader reader;
-            reader.SetFileName(path.c_str());
-            if (!reader.CanRead() || !reader.ReadUpToTag(kPixels, {kPixels})) continue;
-            DicomSlice slice = slice_of(reader.GetFile().GetDataSet());
-            slice.path = path;
-            if (slice.rows < 1 || slice.columns < 1) continue;
-            slice.cut_off = is_cut_off(reader, path, slice);
-            slices.push_back(std::move(slice));
-        } catch (const std::exception&) {  // not a file of this kind
-            continue;
+    if (!fs::is_directory(path, code)) {
+        paths.push_back(path);
+    } else {
+        for (auto it = fs::recursive_directory_iterator(
+                 path, fs::directory_options::skip_permission_denied, code);
+             !code && it != fs::recursive_directory_iterator(); it.increment(code)) {
+            std::error_code of_entry;
+            if (it->is_regular_file(of_entry)) paths.push_back(it->path().string());
         }
     }
-    return slices;
+    std::sort(paths.begin(), paths.end());  // a folder lists its files in no fixed order
+    DicomFolder folder;
+    for (const std::string& file : paths) add_file(file, folder);
+    // Beside a CT, captured screens and the like are no labels.
+    const auto& slices = folder.slices;
+    const auto is_scan = [](const DicomSlice& s) { return is_one_of(s.modality, {"CT", "MR"}); };
+    if (std::any_of(slices.begin(), slices.end(), is_scan)) {
+        for (const DicomSlice& slice : slices)
+            if (!is_scan(slice) && !slice.modality.empty())
+                folder.others.push_back({slice.path, slice.modality, slice.frame_of_reference});
+        std::erase_if(folder.slices, [&](const DicomSlice& slice) {
+            return !is_scan(slice) && !slice.modality.empty();
+        });
+    }
+    return folder;
+}
+
+std::string objects_text(const std::vector<DicomObject>& objects) {
+    std::map<std::string, std::vector<std::string>> names;
+    for (const DicomObject& object : objects)
+        names[object.modality].push_back(fs::path(object.path).filename().string());
+    std::string text;
+    for (const auto& [modality, files] : names)
+        text += (text.empty() ? "" : ", ") + std::to_string(files.size()) + " " + modality + " (" +
+                files.front() + (files.size() > 1 ? ", ..." : "") + ")";
+    return text;
 }
 
 namespace {
@@ -164,26 +173,41 @@ constexpr double kMaxShift = 0.05;   // of the spacing, off even places
 constexpr double kSameSlice = 0.01;  // of the spacing: two slices in one place
 
 std::string name_of(const DicomSlice& slice) {
-    return std::filesystem::path(slice.path).filename().string();
+    const std::string file = fs::path(slice.path).filename().string();
+    return slice.of_frame == 0 ? file : "frame " + std::to_string(slice.of_frame) + " of " + file;
 }
 
 // The slices of each stack that the folder could mean, in the order of their names.
 std::map<std::string, std::vector<DicomSlice>> by_series(std::vector<DicomSlice> slices) {
     std::map<std::string, std::vector<DicomSlice>> series;
     for (DicomSlice& slice : slices)
-        series[slice.series + " " + slice.thickness + " " + std::to_string(slice.rows) + " x " +
-               std::to_string(slice.columns)]
+        series[slice.series + " " + number_text(slice.place().thickness_mm, 4) + " " +
+               std::to_string(slice.rows) + " x " + std::to_string(slice.columns)]
             .push_back(std::move(slice));
     return series;
 }
 
-Status check_directions(const std::vector<DicomSlice>& slices) {
-    const DicomSlice& first = slices.front();
+// Every slice says where it lies, in numbers, and has the directions and pixels of the first.
+Status check_places(const std::vector<DicomSlice>& slices) {
+    const DicomFrame& first = slices.front().place();
     for (const DicomSlice& slice : slices) {
-        if (!slice.placed) return Error{"slice does not say where it lies", slice.path, kExpected};
-        if (norm(slice.along_rows - first.along_rows) > 1e-3 ||
-            norm(slice.along_columns - first.along_columns) > 1e-3)
-            return Error{"slice is turned against " + name_of(first), slice.path, kExpected};
+        const DicomFrame& place = slice.place();
+        const std::string of = slice.of_frame > 0 ? name_of(slice) + ": " : "";
+        if (!place.fault.empty()) return Error{of + place.fault, slice.path, kExpected};
+        if (!place.placed())
+            return Error{of + "slice does not say where it lies", slice.path, kExpected};
+        if (!(place.row_spacing_mm > 0))
+            return Error{of + "slice does not say how large its pixels are", slice.path, kExpected};
+        if (norm(place.along_rows - first.along_rows) > 1e-3 ||
+            norm(place.along_columns - first.along_columns) > 1e-3)
+            return Error{of + "slice is turned against " + name_of(slices.front()), slice.path,
+                         kExpected};
+        if (std::abs(place.row_spacing_mm / first.row_spacing_mm - 1) > 1e-3 ||
+            std::abs(place.column_spacing_mm / first.column_spacing_mm - 1) > 1e-3)
+            return Error{of + text("pixels of %.4g x %.4g mm among slices of %.4g x %.4g mm",
+                                   place.column_spacing_mm, place.row_spacing_mm,
+                                   first.column_spacing_mm, first.row_spacing_mm),
+                         slice.path, kExpected};
     }
     return Done{};
 }
@@ -194,9 +218,10 @@ std::string stray_between(const std::vector<DicomSlice>& others,
                           const DicomSlice& after,
                           Vector3 normal) {
     for (const DicomSlice& other : others) {
-        if (!other.placed) continue;
-        const double place = dot(other.position - before.position, normal);
-        const double gap = dot(after.position - before.position, normal);
+        if (!other.place().placed()) continue;
+        const Point3 from = before.place().position;
+        const double place = dot(other.place().position - from, normal);
+        const double gap = dot(after.place().position - from, normal);
         if (place > 0.1 * gap && place < 0.9 * gap)
             return "; " + name_of(other) + ", which lies there, is of another series";
     }
@@ -209,7 +234,7 @@ Status check_spacing(const std::vector<DicomSlice>& slices,
                      Vector3 normal) {
     std::vector<double> gaps;
     for (std::size_t n = 1; n < slices.size(); ++n)
-        gaps.push_back(dot(slices[n].position - slices[n - 1].position, normal));
+        gaps.push_back(dot(slices[n].place().position - slices[n - 1].place().position, normal));
     std::vector<double> sorted = gaps;
     const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
     std::nth_element(sorted.begin(), middle, sorted.end());
@@ -231,10 +256,11 @@ Status check_spacing(const std::vector<DicomSlice>& slices,
     }
     // Even places lie on the line from the first slice to the last.
     const double count = static_cast<double>(gaps.size());
-    const Vector3 even = (slices.back().position - slices.front().position) / count;
+    const Point3 start = slices.front().place().position;
+    const Vector3 even = (slices.back().place().position - start) / count;
     for (std::size_t n = 1; n < gaps.size(); ++n) {
-        const Point3 place = slices.front().position + static_cast<double>(n) * even;
-        const double off = distance(place, slices[n].position);
+        const Point3 place = start + static_cast<double>(n) * even;
+        const double off = distance(place, slices[n].place().position);
         if (off > kMaxShift * norm(even))
             return Error{
                 text("slices are unevenly spaced: this one lies %.3g mm off its place", off),
@@ -273,47 +299,120 @@ std::string warning_of_numbers(const std::vector<DicomSlice>& slices) {
         lowest);
 }
 
+// What headers say of the distance of slices against their places, which hold.
+std::string warning_of_thickness(const DicomFrame& slice, double step_mm) {
+    if (slice.between_mm > 0 && std::abs(slice.between_mm / step_mm - 1) > 0.01)
+        return text(
+            "the DICOM slices lie %.4g mm apart by their positions, and %.4g mm by "
+            "SpacingBetweenSlices: the positions were taken; check that none is missing",
+            step_mm, slice.between_mm);
+    if (slice.thickness_mm > 0 && step_mm > 1.5 * slice.thickness_mm)
+        return text(
+            "the DICOM slices are %.4g mm thick and lie %.4g mm apart: check that none is "
+            "missing",
+            slice.thickness_mm, step_mm);
+    return "";
+}
+
+// A file with all frames as one slice for each.
+Status split_frames(DicomStack& stack) {
+    for (const DicomSlice& slice : stack.slices)
+        if (stack.slices.size() > 1 && slice.frames.size() > 1)
+            return Error{"holds several slices", slice.path,
+                         "expected one slice in each file, or one file with all of them"};
+    DicomSlice whole = std::move(stack.slices.front());
+    std::vector<DicomFrame> frames = std::move(whole.frames);
+    DicomFrame& first = frames.front();
+    const std::size_t placed = static_cast<std::size_t>(std::count_if(
+        frames.begin(), frames.end(), [](const DicomFrame& f) { return f.has_position; }));
+    if (placed == 1 && first.placed() && first.fault.empty()) {
+        const double step = first.between_mm > 0 ? first.between_mm : first.thickness_mm;
+        if (!(step > 0))
+            return Error{"says where the first of its frames lies, and not how far apart they are",
+                         whole.path, kExpected};
+        for (std::size_t n = 1; n < frames.size(); ++n) {
+            frames[n].position = first.position + static_cast<double>(n) * step * first.normal();
+            frames[n].has_position = true;
+        }
+        stack.warnings.push_back(
+            text("the DICOM file %s places only the first of its %zu frames: the others were "
+                 "taken to follow it every %.4g mm (%s) along (%.3g, %.3g, %.3g); check that the "
+                 "body is not upside down",
+                 name_of(whole).c_str(), frames.size(), step,
+                 first.between_mm > 0 ? "SpacingBetweenSlices" : "SliceThickness",
+                 -first.normal().x, -first.normal().y, first.normal().z));
+    }
+    whole.number = 0;
+    stack.slices.clear();
+    for (DicomFrame& frame : frames) {
+        stack.slices.push_back(whole);
+        stack.slices.back().frames = {std::move(frame)};
+        stack.slices.back().of_frame = static_cast<int>(stack.slices.size());
+    }
+    return Done{};
+}
+
+std::string series_text(const std::vector<DicomSlice>& slices) {
+    const DicomSlice& first = slices.front();
+    std::size_t count = 0;
+    for (const DicomSlice& slice : slices) count += slice.frames.size();
+    return std::to_string(count) + " x " + first.modality + " from " + name_of(first) +
+           (first.description.empty() ? "" : ", '" + first.description + "'");
+}
+
 }  // namespace
 
 Result<DicomStack> dicom_stack(std::vector<DicomSlice> slices, const std::string& folder) {
     auto series = by_series(std::move(slices));
     if (series.empty())
-        return Error{"folder holds neither masks nor DICOM slices", folder,
-                     "expected one .nii.gz (or .nrrd, .mha) mask per structure, or a DICOM series"};
+        return Error{"folder holds neither masks nor DICOM images", folder,
+                     "expected one .nii.gz (or .nrrd, .mha) mask per structure, a DICOM "
+                     "segmentation or a DICOM series"};
+    const auto count = [](const std::vector<DicomSlice>& of) {
+        std::size_t sum = 0;
+        for (const DicomSlice& slice : of) sum += slice.frames.size();
+        return sum;
+    };
     auto largest = series.begin();
     for (auto it = series.begin(); it != series.end(); ++it)
-        if (it->second.size() > largest->second.size()) largest = it;
+        if (count(it->second) > count(largest->second)) largest = it;
     DicomStack stack;
     stack.slices = std::move(largest->second);
     series.erase(largest);
     std::vector<DicomSlice> others;
-    for (auto& [uid, of_series] : series)
+    for (auto& [uid, of_series] : series) {
+        stack.warnings.push_back("folder holds " + std::to_string(series.size() + 1) +
+                                 " DICOM series; the one with the most slices was taken (" +
+                                 series_text(stack.slices) + "), and not " +
+                                 series_text(of_series) +
+                                 ": to take another, give a folder that holds it alone");
         others.insert(others.end(), of_series.begin(), of_series.end());
-    if (!others.empty())
-        stack.warnings.push_back(
-            text("folder holds %zu DICOM series; the one with the most slices (%zu) was taken, and "
-                 "not %s: keep one series per folder",
-                 series.size() + 1, stack.slices.size(), name_of(others.front()).c_str()));
+    }
     for (const DicomSlice& slice : stack.slices)
         if (slice.cut_off)
             return Error{"file is cut off: it ends before its pixels do", slice.path,
                          "copy or export the series again"};
-    if (stack.slices.size() == 1) return stack;
+    if (count(stack.slices) > stack.slices.size()) {
+        SONOCASE_TRY_DONE(split_frames(stack));
+    }
 
-    SONOCASE_TRY_DONE(check_directions(stack.slices));
-    const DicomSlice& any = stack.slices.front();
-    const Vector3 normal = cross(any.along_rows, any.along_columns);
+    SONOCASE_TRY_DONE(check_places(stack.slices));
+    if (stack.slices.size() == 1) return stack;
+    const Vector3 normal = stack.slices.front().place().normal();
     std::vector<std::pair<double, std::size_t>> order;
     for (std::size_t n = 0; n < stack.slices.size(); ++n)
-        order.emplace_back(dot(stack.slices[n].position - Point3{}, normal), n);
+        order.emplace_back(dot(stack.slices[n].place().position - Point3{}, normal), n);
     std::sort(order.begin(), order.end());  // by place, then by name
     std::vector<DicomSlice> in_order;
     for (const auto& [place, n] : order) in_order.push_back(std::move(stack.slices[n]));
     stack.slices = std::move(in_order);
     SONOCASE_TRY_DONE(check_spacing(stack.slices, others, normal));
     SONOCASE_TRY_DONE(check_declared(stack.slices));
-    if (std::string warning = warning_of_numbers(stack.slices); !warning.empty())
-        stack.warnings.push_back(std::move(warning));
+    const double step =
+        (order.back().first - order.front().first) / static_cast<double>(stack.slices.size() - 1);
+    for (std::string warning : {warning_of_numbers(stack.slices),
+                                warning_of_thickness(stack.slices.front().place(), step)})
+        if (!warning.empty()) stack.warnings.push_back(std::move(warning));
     return stack;
 }
 
@@ -324,24 +423,97 @@ std::string size_text(const itk::ImageIOBase& io) {
            " pixels";
 }
 
-// Placement by the first slice; the third axis and its spacing lead to the last one.
-Grid grid_of(const itk::ImageIOBase& first, Point3 last, int slices) {
-    Grid grid;
-    Vector3 step = last - Point3{first.GetOrigin(0), first.GetOrigin(1), first.GetOrigin(2)};
-    const int frames = first.GetNumberOfDimensions() > 2 ? int(first.GetDimensions(2)) : 1;
-    grid.size = {int(first.GetDimensions(0)), int(first.GetDimensions(1)), slices * frames};
-    for (int axis = 0; axis < 3; ++axis) {
-        const auto a = static_cast<unsigned>(axis);
-        const bool through = axis == 2 && slices > 1;
-        grid.spacing_mm[axis] = through ? norm(step) / (slices - 1) : first.GetSpacing(a);
-        const double sign = axis < 2 ? -1 : 1;  // LPS to RAS
-        grid.origin_mm[axis] = sign * first.GetOrigin(a);
-        for (unsigned column = 0; column < 3; ++column)
-            grid.direction(axis, static_cast<int>(column)) =
-                sign * (column == 2 && slices > 1 ? step[axis] / norm(step)
-                                                  : first.GetDirection(column)[a]);
+// How far the last slice lies beside the first (a tilted gantry), in DICOM's axes.
+Vector3 slide_of(const DicomStack& stack) {
+    const DicomFrame &first = stack.slices.front().place(), &last = stack.slices.back().place();
+    const Vector3 all = last.position - first.position, normal = first.normal();
+    return all - dot(all, normal) * normal;
+}
+
+// The lattice of the stack: its third axis is the normal of the slices. Slices that slide over one
+// another by less than a tenth of a voxel from the first to the last are squared; the middle of the
+// body stays where it is.
+Result<Grid> grid_of(const DicomStack& stack, const std::string& path, NativeVolume& volume) {
+    const DicomFrame &first = stack.slices.front().place(), &last = stack.slices.back().place();
+    const auto count = static_cast<double>(stack.slices.size());
+    const double height = dot(last.position - first.position, first.normal());
+    double step = count > 1 ? height / (count - 1) : first.thickness_mm;
+    if (!(step > 0)) step = first.between_mm;
+    if (!(step > 0)) return Error{"one slice that does not say how thick it is", path, kExpected};
+    const Vector3 slide = slide_of(stack);
+    const double off = norm(slide);
+    const double voxel = std::max({first.row_spacing_mm, first.column_spacing_mm, step});
+    Point3 origin = first.position;
+    if (off > 1e-3 * voxel && off <= 0.1 * voxel) {
+        volume.notes.push_back(
+            {"shear", text("slices slide by %.3g mm over the stack: squared, with an error of "
+                           "%.3g mm at either end",
+                           off, off / 2)});
+        origin = origin + slide / 2;
     }
-    return grid;
+    return ras_grid(origin, first, step,
+                    {stack.slices.front().columns, stack.slices.front().rows,
+                     static_cast<std::int32_t>(stack.slices.size())});
+}
+
+// Whether the slices slide by more than can be squared: an error, or a warning if they are to be
+// resampled.
+Result<bool> is_sheared(const DicomStack& stack,
+                        const Grid& grid,
+                        bool resample,
+                        const std::string& path,
+                        std::vector<std::string>& warnings) {
+    const double off = norm(slide_of(stack));
+    const Vector3 spacing = grid.spacing_mm;
+    if (off <= 0.1 * std::max({spacing.x, spacing.y, spacing.z})) return false;
+    const std::string what = text(
+        "slices are sheared against their stack by %.3g degrees (a tilted gantry): the last lies "
+        "%.4g mm beside the first",
+        std::atan2(off, spacing.z * (grid.size.z - 1)) * 180 / kPi, off);
+    if (!resample)
+        return Error{what, path,
+                     "give --resample-shear, or resample the series to an orthogonal "
+                     "grid first"};
+    warnings.push_back(what + text("; each slice was moved by whole pixels, to within %.2g mm",
+                                   std::hypot(spacing.x, spacing.y) / 2));
+    return true;
+}
+
+// Moves each slice by the whole pixels that it slides by, on a grid with room for all.
+void unshear(const DicomStack& stack, NativeVolume& volume) {
+    const DicomFrame& first = stack.slices.front().place();
+    const Vector3 slide = slide_of(stack);
+    const Grid old = volume.grid;
+    const auto shift = [&](int k, int axis) {
+        const Vector3 along = axis == 0 ? first.along_rows : first.along_columns;
+        return static_cast<int>(std::lround(dot(slide, along) / old.spacing_mm[axis] * k /
+                                            std::max(1, old.size.z - 1)));
+    };
+    int low[2] = {0, 0};
+    for (int axis = 0; axis < 2; ++axis) {
+        const int last = shift(old.size.z - 1, axis);
+        low[axis] = std::min(0, last);
+        volume.grid.size[axis] += std::abs(last);
+    }
+    volume.grid.origin_mm = old.point_from_voxel({double(low[0]), double(low[1]), 0});
+    const auto row = static_cast<std::size_t>(old.size.x),
+               rows = static_cast<std::size_t>(old.size.y);
+    const std::size_t bytes = volume.bytes.size() / old.voxel_count();
+    std::vector<std::byte> moved(volume.grid.voxel_count() * bytes);
+    for (int k = 0; k < old.size.z; ++k) {
+        const auto right = static_cast<std::size_t>(shift(k, 0) - low[0]),
+                   down = static_cast<std::size_t>(shift(k, 1) - low[1]);
+        for (std::size_t j = 0; j < rows; ++j) {
+            const std::size_t from = (static_cast<std::size_t>(k) * rows + j) * row;
+            const std::size_t to =
+                (static_cast<std::size_t>(k) * static_cast<std::size_t>(volume.grid.size.y) + j +
+                 down) *
+                    static_cast<std::size_t>(volume.grid.size.x) +
+                right;
+            std::memcpy(moved.data() + to * bytes, volume.bytes.data() + from * bytes, row * bytes);
+        }
+    }
+    volume.bytes = std::move(moved);
 }
 
 // Reads one slice to the end of the volume, which begins with the first and takes its type.
@@ -363,57 +535,200 @@ Status append_slice(const DicomSlice& slice, itk::GDCMImageIO& io, NativeVolume&
     return Done{};
 }
 
-Result<NativeVolume> read_stack(const DicomStack& stack, const std::string& folder) {
+// The frames of one file in the order of the stack.
+void sort_frames(const DicomStack& stack, NativeVolume& volume) {
+    const std::size_t bytes = volume.bytes.size() / stack.slices.size();
+    std::vector<std::byte> sorted(volume.bytes.size());
+    for (std::size_t n = 0; n < stack.slices.size(); ++n)
+        std::memcpy(
+            sorted.data() + n * bytes,
+            volume.bytes.data() + static_cast<std::size_t>(stack.slices[n].of_frame - 1) * bytes,
+            bytes);
+    volume.bytes = std::move(sorted);
+}
+
+Result<NativeVolume> read_stack(const DicomStack& stack,
+                                bool resample_shear,
+                                const std::string& path) {
     NativeVolume volume;
     volume.warnings = stack.warnings;
-    const auto slices = stack.slices.size();
-    itk::GDCMImageIO::Pointer first;
-    Point3 last;
+    SONOCASE_TRY(volume.grid, grid_of(stack, path, volume));
+    SONOCASE_TRY(const bool sheared,
+                 is_sheared(stack, volume.grid, resample_shear, path, volume.warnings));
+    const DicomSlice& first = stack.slices.front();
+    const bool one_file = first.of_frame > 0;
     for (const DicomSlice& slice : stack.slices) {
+        if (one_file && &slice != &first) break;
         try {
             const auto io = itk::GDCMImageIO::New();
             io->SetFileName(slice.path);
             io->ReadImageInformation();
-            if (!first) {
-                first = io;
-                volume.bytes.reserve(slices * static_cast<std::size_t>(io->GetImageSizeInBytes()));
-            }
-            if (slices > 1 && io->GetNumberOfDimensions() > 2 && io->GetDimensions(2) != 1)
-                return Error{"holds several slices", slice.path,
-                             "expected one slice in each file, or one file with all of them"};
-            if (io->GetDimensions(0) != first->GetDimensions(0) ||
-                io->GetDimensions(1) != first->GetDimensions(1))
-                return Error{"slice of " + size_text(*io) + " among those of " + size_text(*first),
+            const std::size_t frames =
+                io->GetNumberOfDimensions() > 2 ? std::size_t(io->GetDimensions(2)) : 1;
+            if (int(io->GetDimensions(0)) != slice.columns ||
+                int(io->GetDimensions(1)) != slice.rows ||
+                frames != (one_file ? stack.slices.size() : 1))
+                return Error{"slice of " + size_text(*io) + " where its header says " +
+                                 std::to_string(slice.columns) + " x " + std::to_string(slice.rows),
                              slice.path, kExpected};
+            if (volume.bytes.empty() && !one_file)
+                volume.bytes.reserve(stack.slices.size() *
+                                     static_cast<std::size_t>(io->GetImageSizeInBytes()));
             SONOCASE_TRY_DONE(append_slice(slice, *io, volume));
-            last = {io->GetOrigin(0), io->GetOrigin(1), io->GetOrigin(2)};
-        } catch (const itk::ExceptionObject& exception) {
+        } catch (const std::exception&) {
             return Error{
-                std::string("cannot be read as a DICOM slice (") + exception.GetDescription() + ")",
-                slice.path, kExpected};
+                "the pixels cannot be read: the file is damaged, or packed in a way that "
+                "is not known here",
+                slice.path, "export the series again, without compression"};
         }
     }
-    volume.grid = grid_of(*first, last, static_cast<int>(slices));
-    for (int a = 0; a < 3; ++a)
-        for (int b = a + 1; b < 3; ++b)
-            if (std::abs(dot(volume.grid.direction.column(a), volume.grid.direction.column(b))) >
-                1e-3)
-                return Error{"slices are sheared against their stack (tilted gantry)", folder,
-                             "resample the series to an orthogonal grid first"};
+    if (one_file) sort_frames(stack, volume);
+    if (sheared) unshear(stack, volume);
     return volume;
+}
+
+Error damaged(const std::string& path) {
+    return {
+        "cannot be read as DICOM: the file is damaged, cut off, or packed in a way that is not "
+        "known here",
+        path, "copy it or export it again, without compression"};
+}
+
+// Beside a segmentation: that it belongs to the scan there.
+void check_scan(const DicomObject& segmentation,
+                const std::vector<DicomSlice>& slices,
+                NativeVolume& volume) {
+    if (slices.empty()) return;
+    bool its_series = segmentation.series.empty(), its_frame = false;
+    for (const DicomSlice& slice : slices) {
+        its_series = its_series || slice.series == segmentation.series;
+        its_frame = its_frame || slice.frame_of_reference.empty() ||
+                    segmentation.frame_of_reference.empty() ||
+                    slice.frame_of_reference == segmentation.frame_of_reference;
+    }
+    const std::string name = fs::path(segmentation.path).filename().string();
+    if (!its_frame)
+        volume.warnings.push_back(
+            name +
+            " has another frame of reference than the scan beside it: it is of another "
+            "examination, or was moved; check that they belong together");
+    else if (!its_series)
+        volume.warnings.push_back(name +
+                                  " was drawn on a series that is not the one beside it: check "
+                                  "that they belong together");
+    volume.notes.push_back({"scan", "the labels are those of " + name + "; the scan beside it (" +
+                                        series_text(slices) + ") has none and was left out"});
+}
+
+// The distance of the slices on which the segmentation was drawn; 0: not known.
+double scan_step_mm(const DicomObject& segmentation, std::vector<DicomSlice> slices) {
+    std::erase_if(slices,
+                  [&](const DicomSlice& slice) { return slice.series != segmentation.series; });
+    const auto stack = dicom_stack(std::move(slices), segmentation.path);
+    if (!stack || stack->slices.size() < 2) return 0;
+    const DicomFrame &first = stack->slices.front().place(), &last = stack->slices.back().place();
+    return dot(last.position - first.position, first.normal()) /
+           static_cast<double>(stack->slices.size() - 1);
+}
+
+Result<NativeVolume> read_headed(const DicomFolder& folder,
+                                 bool resample_shear,
+                                 const std::string& path) {
+    if (folder.segmentations.size() > 1)
+        return Error{"folder holds " + std::to_string(folder.segmentations.size()) +
+                         " DICOM segmentations: " + objects_text(folder.segmentations),
+                     path, "give one of them by its own path"};
+    if (!folder.segmentations.empty()) {
+        const DicomObject& segmentation = folder.segmentations.front();
+        if (segmentation.cut_off)
+            return Error{"file is cut off: it ends before its pixels do", segmentation.path,
+                         "copy or export it again"};
+        SONOCASE_TRY(auto volume, read_dicom_segmentation(segmentation.path,
+                                                          scan_step_mm(segmentation, folder.slices),
+                                                          resample_shear));
+        check_scan(segmentation, folder.slices, volume);
+        std::vector<DicomObject> others = folder.others;
+        others.insert(others.end(), folder.structure_sets.begin(), folder.structure_sets.end());
+        for (const std::string& file : folder.damaged) others.push_back({file, "damaged"});
+        if (!others.empty())
+            volume.notes.push_back({"left_out", "of the folder: " + objects_text(others)});
+        return volume;
+    }
+    if (!folder.structure_sets.empty())
+        return Error{"a DICOM structure set (RTSTRUCT): contours, which are not read",
+                     folder.structure_sets.front().path,
+                     "expected voxels: make a DICOM segmentation or masks of it, in 3D Slicer with "
+                     "SlicerRT, or: plastimatch convert --input FILE --referenced-ct SERIES "
+                     "--output-prefix masks --prefix-format nrrd"};
+    if (!folder.damaged.empty()) return damaged(folder.damaged.front());
+    if (folder.slices.empty() && !folder.others.empty())
+        return Error{"holds no labels: " + objects_text(folder.others), path,
+                     "expected a DICOM segmentation, or slices whose pixels are label values"};
+    std::error_code code;
+    if (!fs::is_directory(path, code)) {
+        if (folder.slices.empty()) return damaged(path);
+        if (folder.slices.front().frames.size() == 1)
+            return Error{"one DICOM slice of a series", path, "give the folder of the series"};
+    }
+    SONOCASE_TRY(auto stack, dicom_stack(folder.slices, path));
+    if (!folder.others.empty())
+        stack.warnings.push_back("left out of the DICOM folder: " + objects_text(folder.others));
+    return read_stack(stack, resample_shear, path);
 }
 
 }  // namespace
 
-Result<NativeVolume> read_dicom_series(const std::string& folder) {
+bool unpack_dicom_pixels(
+    const std::string& path, int columns, int rows, int frames, int bits, char* to) {
+    const QuietLibrary quiet;
+    try {
+        gdcm::Reader reader;
+        reader.SetFileName(path.c_str());
+        const gdcm::Tag pixels(0x7fe0, 0x10);
+        if (!reader.CanRead() || !reader.Read()) return false;
+        const gdcm::File& file = reader.GetFile();
+        if (!file.GetDataSet().FindDataElement(pixels)) return false;
+        const auto depth = static_cast<std::uint16_t>(bits);
+        gdcm::Bitmap bitmap;
+        bitmap.SetNumberOfDimensions(3);
+        bitmap.SetDimension(0, static_cast<unsigned>(columns));
+        bitmap.SetDimension(1, static_cast<unsigned>(rows));
+        bitmap.SetDimension(2, static_cast<unsigned>(frames));
+        bitmap.SetPixelFormat(
+            gdcm::PixelFormat(1, depth, depth, static_cast<std::uint16_t>(depth - 1), 0));
+        bitmap.SetPhotometricInterpretation(gdcm::PhotometricInterpretation::MONOCHROME2);
+        bitmap.SetTransferSyntax(file.GetHeader().GetDataSetTransferSyntax());
+        bitmap.SetDataElement(file.GetDataSet().GetDataElement(pixels));
+        const auto bytes = static_cast<std::uint64_t>(columns) * static_cast<std::uint64_t>(rows) *
+                           static_cast<std::uint64_t>(frames) *
+                           static_cast<std::uint64_t>(bits / 8);
+        return bitmap.GetBufferLength() == bytes && bitmap.GetBuffer(to);
+    } catch (const std::exception&) {
+        return false;
+    }
+}
+
+VolumeSize size_in_dicom(const std::string& path) {
+    const DicomFolder folder = read_dicom_headers(path);
+    if (folder.segmentations.size() == 1)
+        return size_in_segmentation(folder.segmentations.front().path);
+    const auto stack = dicom_stack(folder.slices, path);
+    VolumeSize size;
+    if (!stack) return size;
+    for (const DicomSlice& slice : stack->slices)
+        size.voxels +=
+            static_cast<std::uint64_t>(slice.rows) * static_cast<std::uint64_t>(slice.columns);
+    size.bytes = 2 * size.voxels;  // CT and most others have two bytes per voxel
+    return size;
+}
+
+Result<NativeVolume> read_dicom(const std::string& path, bool resample_shear) {
     const QuietLibrary quiet;
     itk::Object::GlobalWarningDisplayOff();
-    SONOCASE_TRY(auto stack, dicom_stack(read_dicom_headers(folder), folder));
     try {
-        return read_stack(stack, folder);
-    } catch (const std::exception& exception) {
-        return Error{std::string("cannot be read as a DICOM series (") + exception.what() + ")",
-                     folder, kExpected};
+        return read_headed(read_dicom_headers(path), resample_shear, path);
+    } catch (const std::exception&) {
+        return damaged(path);
     }
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Which files of a folder make up one stack of DICOM slices, and in what order; faults of the stack
-// are found in the headers, before any pixel is read. Internal to this room.
+// What a folder of DICOM files holds, which of them make up one stack of slices, and in what order;
+// faults of the stack are found in the headers, before any pixel is read. Internal to this room.
 #pragma once
 
 #include <string>
@@ -9,40 +9,77 @@
 
 #include "formats/base/geometry.h"
 #include "formats/base/result.h"
+#include "formats/volume/label_volume.h"
 
 namespace sonocase::pipeline::inline import_volume {
 
-// What the header of one file says. Positions and directions are those of DICOM: to the left, to
-// the back, to the head.
+// Where a header puts one frame. Positions and directions are those of DICOM: to the left, to the
+// back, to the head.
+struct DicomFrame {
+    bool has_position = false, has_orientation = false;
+    Point3 position;                                      // centre of the first pixel
+    Vector3 along_rows{1, 0, 0}, along_columns{0, 1, 0};  // unit vectors at right angles
+    double row_spacing_mm = 0, column_spacing_mm = 0;  // from row to row, column to column; 0: none
+    double thickness_mm = 0, between_mm = 0;  // SliceThickness, SpacingBetweenSlices; 0: none
+    int segment = 0;                          // Referenced Segment Number; 0: none
+    std::string fault;                        // an element that holds no finite numbers; else empty
+
+    bool placed() const { return has_position && has_orientation; }
+    Vector3 normal() const { return cross(along_rows, along_columns); }
+};
+
+// What the header of one file with pixels says.
 struct DicomSlice {
     std::string path;
     std::string series;       // Series Instance UID
     std::string acquisition;  // Acquisition Number
-    std::string thickness;    // Slice Thickness
-    int rows = 0, columns = 0, frames = 1;
-    bool cut_off = false;                   // the file ends before its pixels do
-    int number = 0;                         // Instance Number; 0: none
-    int declared = 0;                       // number of slices that the header declares; 0: none
+    std::string modality, description, frame_of_reference;
+    int rows = 0, columns = 0;
+    std::vector<DicomFrame> frames;  // one, of an object of several frames all
+    int of_frame = 0;      // a frame of an object of several, from 1; 0: the only one of its file
+    bool cut_off = false;  // the file ends before its pixels do
+    int number = 0;        // Instance Number; 0: none
+    int declared = 0;      // number of slices that the header declares; 0: none
     bool declared_for_acquisition = false;  // that number counts one acquisition, not the series
-    bool placed = false;                    // position and orientation are there
-    Point3 position;
-    Vector3 along_rows{1, 0, 0}, along_columns{0, 1, 0};
+
+    const DicomFrame& place() const { return frames.front(); }
 };
 
-// The slices of every DICOM image in the folder, in the order of their names. Other files are
-// skipped, folders are not looked into.
-std::vector<DicomSlice> read_dicom_headers(const std::string& folder);
+// A DICOM object that is no slice.
+struct DicomObject {
+    std::string path;
+    std::string modality = {};            // "SEG", "RTSTRUCT", "SR", ...
+    std::string frame_of_reference = {};  // Frame of Reference UID
+    std::string series = {};              // Series Instance UID of the images that it refers to
+    bool cut_off = false;                 // a segmentation that ends before its pixels do
+};
+
+struct DicomFolder {
+    std::vector<DicomSlice> slices;           // CT, MR and others that may hold labels
+    std::vector<DicomObject> segmentations;   // of any kind
+    std::vector<DicomObject> structure_sets;  // RTSTRUCT
+    std::vector<DicomObject> others;          // reports, doses, localizers, ...
+    std::vector<std::string> damaged;         // DICOM files whose header cannot be read
+};
+
+// Every DICOM object in the folder and its sub-folders, in the order of their names; or in the
+// file. Other files are skipped.
+DicomFolder read_dicom_headers(const std::string& path);
+
+// "2 SR (a.dcm, ...), 1 PR (b.dcm)"; empty for none.
+std::string objects_text(const std::vector<DicomObject>& objects);
 
 struct DicomStack {
     std::vector<DicomSlice> slices;  // ascending along the stack
     std::vector<std::string> warnings;
 };
 
-// The series with the most slices, in order. Slices may lie off even spacing by a twentieth of it,
-// as rounding of positions leaves them. Errors, each naming a file: a slice that is cut off, does
-// not say where it lies, is turned against the others, is there twice, is missing between two
-// others, or is missing at an end by the number that a header declares; spacing that is uneven in
-// another way. Cost: n log n.
+// The series with the most slices, in order; those of one object of several frames as one slice
+// each. Slices may lie off even spacing by a twentieth of it, as rounding of positions leaves them.
+// Errors, each naming a file: a slice that is cut off, does not say where it lies or how large its
+// pixels are, is turned against the others, is there twice, is missing between two others, or is
+// missing at an end by the number that a header declares; numbers that are not finite; spacing that
+// is uneven in another way. Cost: n log n.
 Result<DicomStack> dicom_stack(std::vector<DicomSlice> slices, const std::string& folder);
 
 }  // namespace sonocase::pipeline::inline import_volume

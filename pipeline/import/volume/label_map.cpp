@@ -7,7 +7,10 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <numeric>
+#include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -18,8 +21,10 @@
 #include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/base/source_checks.h"
 #include "pipeline/base/stopwatch.h"
+#include "pipeline/import/volume/label_numbering.h"
+#include "pipeline/import/volume/native_volume.h"
+#include "pipeline/import/volume/nifti_file.h"
 #include "pipeline/import/volume/volume_file.h"
-#include "pipeline/import/volume/volume_header.h"
 
 namespace sonocase::pipeline::inline import_volume {
 namespace {
@@ -41,7 +46,9 @@ struct Structure {
 struct StructureList {
     Grid grid;
     std::vector<Structure> structures;
+    std::vector<Note> notes;
     std::vector<std::string> warnings;
+    int assumed_names = 0;  // given by the number alone
 };
 
 const LabelTableEntry* entry_of(const LabelTable& table, int value) {
@@ -61,11 +68,24 @@ Status check_table(const LabelTable& table, const std::string& where) {
     return Done{};
 }
 
-bool same_grid(const Grid& a, const Grid& b) {
-    if (!(a.size == b.size)) return false;
-    const Point3 last{a.size.x - 1.0, a.size.y - 1.0, a.size.z - 1.0};
-    return distance(a.origin_mm, b.origin_mm) < 0.01 &&
-           distance(a.point_from_voxel(last), b.point_from_voxel(last)) < 0.01;
+// Where voxel (0, 0, 0) of `grid` lies in voxels of `base`, if the two are parts of one lattice:
+// same axes and spacing, and every voxel within a tenth of one of its place.
+std::optional<Int3> place_on_lattice(const Grid& base, const Grid& grid) {
+    const Point3 first = base.voxel_from_point(grid.origin_mm);
+    Int3 offset;
+    for (int axis = 0; axis < 3; ++axis) {
+        if (!(std::abs(first[axis]) < 1e5)) return std::nullopt;
+        offset[axis] = static_cast<std::int32_t>(std::lround(first[axis]));
+    }
+    for (int corner = 0; corner < 8; ++corner) {
+        const Int3 at{(corner & 1) ? grid.size.x - 1 : 0, (corner & 2) ? grid.size.y - 1 : 0,
+                      (corner & 4) ? grid.size.z - 1 : 0};
+        const Point3 there = base.voxel_from_point(
+            grid.point_from_voxel({double(at.x), double(at.y), double(at.z)}));
+        for (int axis = 0; axis < 3; ++axis)
+            if (!(std::abs(there[axis] - (at[axis] + offset[axis])) <= 0.1)) return std::nullopt;
+    }
+    return offset;
 }
 
 std::string grid_text(const Grid& grid) {
@@ -97,38 +117,210 @@ void append_runs(const std::vector<std::uint8_t>& voxels,
     }
 }
 
-// Reads a single file or a DICOM series.
-Result<StructureList> read_label_file(const std::string& path, const std::string& table_path) {
-    SONOCASE_TRY(auto file, read_label_layers(path));
-    SONOCASE_TRY_DONE(check_size(file.grid, path));
+// Names that a header or a file name gives in the code page of Windows are turned into UTF-8.
+void mend_name(std::string& name, std::vector<std::string>& warnings) {
+    if (is_utf8(name)) return;
+    name = utf8_of_windows_1252(name);
+    warnings.push_back("the name '" + name +
+                       "' is not UTF-8 in the file and was read as Windows-1252: look whether it "
+                       "is right, or give a table");
+}
 
-    // The tables in order of precedence; a value takes its name from the first table that has it.
+// Where names come from, in the order in which they count.
+struct NameSources {
     std::vector<LabelTable> tables;
-    if (!table_path.empty()) {
-        SONOCASE_TRY(auto table, load_label_csv(table_path));
-        SONOCASE_TRY_DONE(check_table(table, table_path));
-        tables.push_back(std::move(table));
+    LabelTable segments;  // of a .seg.nrrd, by value and layer
+};
+
+Result<NameSources> name_sources(const LabelLayers& file,
+                                 const std::string& path,
+                                 const ImportOptions& options,
+                                 std::vector<std::string>& warnings) {
+    NameSources sources;
+    const bool given = !options.table.empty();
+    if (given) {
+        SONOCASE_TRY(auto table, load_label_table(options.table));
+        SONOCASE_TRY_DONE(check_table(table, options.table));
+        sources.tables.push_back(std::move(table));
     }
-    SONOCASE_TRY(auto segments, segments_of_fields(file.fields, path));
-    if (path.ends_with(".nii") || path.ends_with(".nii.gz")) {
-        SONOCASE_TRY(auto table, load_nifti_label_table(path));
-        SONOCASE_TRY_DONE(check_table(table, path));
-        tables.push_back(std::move(table));
+    if (const Numbering* numbering = find_numbering(options.names)) {
+        LabelTable table;
+        for (std::size_t n = 0; n < numbering->names.size(); ++n)
+            table.push_back({static_cast<int>(n) + 1, std::string(numbering->names[n]), {}, {}, 0});
+        sources.tables.push_back(std::move(table));
     }
-    if (is_volume_file_name(path)) {
+    auto segments = segments_of_fields(file.fields, path);
+    if (!segments && !given) return segments.error();
+    if (segments) sources.segments = *std::move(segments);
+    if (is_nifti_name(path)) {
+        auto table = load_nifti_label_table(path, options.reading.orientation);
+        if (table && check_table(*table, path)) {
+            if (!table->empty()) sources.tables.push_back(*std::move(table));
+        } else if (!given) {
+            if (!table) return table.error();
+            SONOCASE_TRY_DONE(check_table(*table, path));
+        }
+    }
+    if (is_volume_file_name(path) && !given) {
         const std::string side =
             (fs::path(path).parent_path() / (volume_stem(path) + ".csv")).string();
         std::error_code code;
-        if (table_path.empty() && fs::exists(side, code)) {
-            SONOCASE_TRY(auto table, load_label_csv(side));
-            SONOCASE_TRY_DONE(check_table(table, side));
-            tables.push_back(std::move(table));
+        if (fs::is_regular_file(side, code)) {
+            auto table = load_label_table(side);
+            Status fine = table ? check_table(*table, side) : Status(table.error());
+            if (fine)
+                sources.tables.push_back(*std::move(table));
+            else
+                warnings.push_back("the file beside the map names no values and is left out (" +
+                                   std::string(fine.error().message()) +
+                                   "): give --table if there is one");
         }
     }
+    return sources;
+}
 
+// Channels of 0 and 1 without names of segments are one structure each, as networks write them.
+// Gives each its value: its number where channel 0 is the background, else its number and 1; the
+// value of a background is 0.
+Result<std::vector<int>> channel_values(const LabelLayers& file,
+                                        const std::string& path,
+                                        std::vector<std::string>& warnings) {
+    const std::size_t channels = file.layers.size();
+    for (const std::int32_t value : file.values)
+        if (value != 0 && value != 1)
+            return Error{"volume of " + std::to_string(channels) +
+                             " channels whose values are not 0 and 1 alone",
+                         path, "expected three dimensions; export one time step, or a label map"};
+    const auto one =
+        static_cast<std::uint8_t>(file.values.back() == 1 ? file.values.size() - 1 : 255);
+    // Channel 0 is the background where it holds the corners of the volume and no other channel's
+    // voxel.
+    const Grid& grid = file.grid;
+    bool background = true;
+    for (int corner = 0; corner < 8; ++corner)
+        background =
+            background && file.layers[0][grid.index((corner & 1) ? grid.size.x - 1 : 0,
+                                                    (corner & 2) ? grid.size.y - 1 : 0,
+                                                    (corner & 4) ? grid.size.z - 1 : 0)] == one;
+    for (std::size_t c = 1; c < channels && background; ++c)
+        for (std::size_t v = 0; v < file.layers[0].size() && background; ++v)
+            background = file.layers[0][v] != one || file.layers[c][v] != one;
+    std::vector<int> values(channels);
+    for (std::size_t c = 0; c < channels; ++c)
+        values[c] = static_cast<int>(c) + (background ? 0 : 1);
+    warnings.push_back("the file has " + std::to_string(channels) +
+                       " channels of 0 and 1: each is taken as one structure, the first as " +
+                       (background ? "the background" : "value 1"));
+    return values;
+}
+
+// Names by the number alone, where the file and the tables name none or name others as
+// TotalSegmentator does. Sizes and places must not speak against them.
+Status assume_names(const std::string& path,
+                    const ImportOptions& options,
+                    bool none_named,
+                    StructureList& list) {
+    if (options.names == "none" || find_numbering(options.names) != nullptr) return Done{};
+    const Numbering& total = numberings().front();
+    std::vector<NumberedStructure> numbered;
+    std::string examples;
+    int count = 0;
+    Box3 body;
+    for (const Structure& s : list.structures) {
+        NumberedStructure one{s.entry.value, 0, {}, 0};
+        Vector3 sum, squares;
+        const auto x = static_cast<std::uint64_t>(list.grid.size.x),
+                   y = static_cast<std::uint64_t>(list.grid.size.y);
+        for (const VoxelRun run : s.runs) {
+            // A run may go on into the rows that follow: its middle is near enough.
+            const std::uint64_t middle = run.first + run.count / 2;
+            const Vector3 at{static_cast<double>(middle % x), static_cast<double>(middle / x % y),
+                             static_cast<double>(middle / (x * y))};
+            sum = sum + run.count * at;
+            squares = squares + run.count * Vector3{at.x * at.x, at.y * at.y, at.z * at.z};
+            body.include(Point3{} + at);
+        }
+        if (s.voxels == 0) continue;
+        const Vector3 mean = sum / static_cast<double>(s.voxels);
+        for (int axis = 0; axis < 3; ++axis) {
+            const double spread =
+                squares[axis] / static_cast<double>(s.voxels) - mean[axis] * mean[axis];
+            one.length_mm = std::max(
+                one.length_mm, std::sqrt(12 * std::max(spread, 0.0)) * list.grid.spacing_mm[axis]);
+        }
+        const double scale = options.scale;
+        one.length_mm *= scale;
+        one.volume_ml = static_cast<double>(s.voxels) * list.grid.voxel_volume_mm3() *
+                        std::pow(scale, 3) / 1000;
+        one.centre_mm =
+            Point3{} + scale * (list.grid.point_from_voxel({mean.x, mean.y, mean.z}) - Point3{});
+        numbered.push_back(one);
+        const std::string_view name = total.name(s.entry.value);
+        if (!s.entry.name.empty() || name.empty()) continue;
+        if (++count <= 3)
+            examples +=
+                (count > 1 ? ", " : "") + std::to_string(s.entry.value) + " " + std::string(name);
+    }
+    if (count == 0) return Done{};
+    if (count > 3) examples += ", ...";
+    // A body of another unit is told of as that: sizes say nothing of names.
+    double length_mm = 0;
+    for (int axis = 0; axis < 3; ++axis)
+        length_mm = std::max(
+            length_mm, (body.extent()[axis] + 1) * options.scale * list.grid.spacing_mm[axis]);
+    NamesFit fit;
+    std::vector<const Numbering*> others;
+    if (length_mm >= kMinTorsoMm && length_mm <= kMaxTorsoMm) {
+        fit = names_fit(total, numbered);
+        if (none_named) others = other_numberings(total, numbered);
+    }
+    // Of a few organs in an order that few people have, another numbering is the less likely cause.
+    constexpr std::size_t kMany = 5;
+    const bool refused =
+        fit.gross || (!fit.misfits.empty() && !others.empty() && numbered.size() >= kMany);
+    const std::string source =
+        none_named ? "neither the file nor a table names its values" : "no table names some values";
+    if (refused) {
+        std::string advice = "give --table with rows of value,name";
+        if (!others.empty())
+            advice = "the numbers fit " + std::string(others.front()->title) + ": give --names " +
+                     std::string(others.front()->key) + ", or --table with rows of value,name";
+        return Error{source + ", and they are not numbered as in TotalSegmentator v2 total: " +
+                         fit.misfits.front(),
+                     path, advice + ", or --names none"};
+    }
+    for (Structure& s : list.structures)
+        if (s.entry.name.empty()) s.entry.name = std::string(total.name(s.entry.value));
+    list.assumed_names = count;
+    list.notes.push_back({"names", "assumed: " + std::string(total.title)});
+    if (!fit.misfits.empty()) {
+        list.warnings.push_back(source + ": they are taken as " + std::string(total.title) + " (" +
+                                examples + "), though " + fit.misfits.front() +
+                                "; give --table or --names none if that is wrong");
+    } else if (fit.passed < 6 || !others.empty()) {
+        std::string also;
+        if (!others.empty())
+            also = ", and would fit " + std::string(others.front()->title) + " as well";
+        list.warnings.push_back(source + ": they are taken as " + std::string(total.title) + " (" +
+                                examples + ")" + also +
+                                "; give --table, or --names none, if that is wrong");
+    }
+    return Done{};
+}
+
+// Reads a single file or a DICOM series.
+Result<StructureList> read_label_file(const std::string& path, const ImportOptions& options) {
+    SONOCASE_TRY(auto file, read_label_layers(path, options.reading));
+    SONOCASE_TRY_DONE(check_size(file.grid, path));
     StructureList list;
     list.grid = file.grid;
+    list.notes = std::move(file.notes);
     list.warnings = std::move(file.warnings);
+    SONOCASE_TRY(const auto sources, name_sources(file, path, options, list.warnings));
+    std::vector<int> channels;
+    if (file.layers.size() > 1 && sources.segments.empty()) {
+        SONOCASE_TRY(channels, channel_values(file, path, list.warnings));
+    }
     for (std::size_t layer = 0; layer < file.layers.size(); ++layer) {
         // One pass over the voxels: a run ends where the value changes.
         const std::vector<std::uint8_t>& voxels = file.layers[layer];
@@ -145,20 +337,40 @@ Result<StructureList> read_label_file(const std::string& path, const std::string
         for (std::size_t place = 0; place < of_place.size(); ++place) {
             Structure& structure = of_place[place];
             if (structure.voxels == 0) continue;
-            const int value = file.values[place];
-            for (const LabelTableEntry& segment : segments)
-                if (segment.value == value && segment.layer == static_cast<int>(layer))
-                    structure.entry = segment;
-            for (const LabelTable& table : tables) {
-                if (!structure.entry.name.empty()) break;
-                if (const LabelTableEntry* entry = entry_of(table, value)) structure.entry = *entry;
-            }
-            if (structure.entry.name.empty())
-                structure.entry.name = std::string(totalsegmentator_name(value));
-            structure.entry.value = value;
-            structure.entry.layer = static_cast<int>(layer);
-            list.structures.push_back(std::move(structure));
+            structure.entry.value = channels.empty() ? file.values[place] : channels[layer];
+            structure.entry.layer = channels.empty() ? static_cast<int>(layer) : 0;
+            if (structure.entry.value != 0) list.structures.push_back(std::move(structure));
         }
+    }
+
+    bool none_named = true, unlike_total = false;
+    std::map<int, int> layers_with;  // how many layers hold a value
+    for (const Structure& s : list.structures) ++layers_with[s.entry.value];
+    for (Structure& structure : list.structures) {
+        const int value = structure.entry.value, layer = structure.entry.layer;
+        const auto take = [&](const LabelTableEntry& entry) {
+            if (!structure.entry.name.empty()) return;
+            structure.entry = entry;
+            mend_name(structure.entry.name, list.warnings);
+        };
+        // A table that was given comes before the segments; it cannot tell layers apart.
+        const bool given = !options.table.empty() || find_numbering(options.names) != nullptr;
+        if (given && !sources.tables.empty() && layers_with[value] == 1)
+            if (const auto* entry = entry_of(sources.tables[0], value)) take(*entry);
+        for (const LabelTableEntry& segment : sources.segments)
+            if (segment.value == value && segment.layer == layer) take(segment);
+        for (const LabelTable& table : sources.tables)
+            if (const auto* entry = entry_of(table, value)) take(*entry);
+        structure.entry.value = value;
+        structure.entry.layer = layer;
+        if (structure.entry.name.empty()) continue;
+        none_named = false;
+        const std::string_view total = totalsegmentator_name(value);
+        unlike_total = unlike_total || (!total.empty() && structure.entry.name != total);
+    }
+    // Segments and names unlike TotalSegmentator's say that it did not number the values.
+    if (sources.segments.empty() && !unlike_total) {
+        SONOCASE_TRY_DONE(assume_names(path, options, none_named, list));
     }
     return list;
 }
@@ -171,8 +383,59 @@ bool is_mask_folder(const std::string& path) {
     return false;
 }
 
+// A mask in voxels of the lattice that all masks of a folder lie on.
+struct MaskPlace {
+    Int3 size;
+    Int3 first;
+};
+
+// Gives a list of structures the smallest grid that holds all masks, and moves their runs onto it.
+Status join_masks(const Grid& base,
+                  const std::vector<MaskPlace>& places,
+                  const std::string& folder,
+                  StructureList& list) {
+    Int3 low{0, 0, 0}, high{base.size.x, base.size.y, base.size.z};
+    bool same = true;
+    for (const MaskPlace& place : places) {
+        for (int axis = 0; axis < 3; ++axis) {
+            low[axis] = std::min(low[axis], place.first[axis]);
+            high[axis] = std::max(high[axis], place.first[axis] + place.size[axis]);
+        }
+        same = same && place.size == base.size && place.first == Int3{0, 0, 0};
+    }
+    list.grid = base;
+    if (same) return Done{};
+    Grid& grid = list.grid;
+    grid.origin_mm = base.point_from_voxel({double(low.x), double(low.y), double(low.z)});
+    for (int axis = 0; axis < 3; ++axis) grid.size[axis] = high[axis] - low[axis];
+    if (std::max({grid.size.x, grid.size.y, grid.size.z}) > 65535)
+        return Error{"masks lie far apart", folder, "expected masks of one body"};
+    SONOCASE_TRY_DONE(check_size(grid, folder));
+    for (std::size_t s = 0; s < list.structures.size(); ++s) {
+        const MaskPlace& place = places[s];
+        const auto width = static_cast<std::uint32_t>(place.size.x),
+                   height = static_cast<std::uint32_t>(place.size.y);
+        std::vector<VoxelRun> moved;
+        for (const VoxelRun run : list.structures[s].runs) {
+            for (std::uint32_t at = run.first; at < run.first + run.count;) {  // row by row
+                const std::uint32_t i = at % width, j = at / width % height,
+                                    k = at / width / height;
+                const std::uint32_t count = std::min(width - i, run.first + run.count - at);
+                moved.push_back({static_cast<std::uint32_t>(
+                                     grid.index(static_cast<int>(i) + place.first.x - low.x,
+                                                static_cast<int>(j) + place.first.y - low.y,
+                                                static_cast<int>(k) + place.first.z - low.z)),
+                                 count});
+                at += count;
+            }
+        }
+        list.structures[s].runs = std::move(moved);
+    }
+    return Done{};
+}
+
 // Reads a folder of binary masks; every value other than 0 is inside.
-Result<StructureList> read_mask_folder(const std::string& folder, const std::string& table_path) {
+Result<StructureList> read_mask_folder(const std::string& folder, const ImportOptions& options) {
     std::vector<std::string> files;
     std::error_code code;
     for (const auto& entry : fs::directory_iterator(folder, code)) {
@@ -182,28 +445,35 @@ Result<StructureList> read_mask_folder(const std::string& folder, const std::str
     }
     std::sort(files.begin(), files.end());  // a folder lists its files in no fixed order
     LabelTable table;
-    if (!table_path.empty()) {
-        SONOCASE_TRY(auto loaded, load_label_csv(table_path));
+    if (!options.table.empty()) {
+        SONOCASE_TRY(auto loaded, load_label_table(options.table));
         table = std::move(loaded);
     }
     StructureList list;
+    Grid first_grid;
+    std::vector<MaskPlace> places;
+    std::set<std::string> told;
     for (const std::string& path : files) {
-        SONOCASE_TRY(auto mask, read_label_layers(path));
+        SONOCASE_TRY(auto mask, read_label_layers(path, options.reading));
         if (mask.layers.size() != 1 || mask.values.size() > 2)
             return Error{
                 "mask holds " + std::to_string(mask.values.size()) + " different values", path,
                 "expected 0 and one other value in each file of the folder; give a label map "
                 "by its own path"};
-        if (list.structures.empty()) {
-            list.grid = mask.grid;
-            SONOCASE_TRY_DONE(check_size(list.grid, path));
-        } else if (!same_grid(list.grid, mask.grid)) {
+        if (places.empty()) first_grid = mask.grid;
+        SONOCASE_TRY_DONE(check_size(mask.grid, path));
+        const auto offset = place_on_lattice(first_grid, mask.grid);
+        if (!offset)
             return Error{"mask of " + grid_text(mask.grid) + " voxels lies on another grid than " +
-                             files[0] + " (" + grid_text(list.grid) + ")",
+                             files[0] + " (" + grid_text(first_grid) + ")",
                          path, "resample all masks to one grid"};
-        }
+        places.push_back({mask.grid.size, *offset});
+        for (const std::string& warning : mask.warnings)
+            if (told.insert(warning).second)
+                list.warnings.push_back(fs::path(path).filename().string() + ": " + warning);
         Structure structure;
         structure.entry.name = volume_stem(path);
+        mend_name(structure.entry.name, list.warnings);
         for (const LabelTableEntry& entry : table)
             if (entry.name == structure.entry.name) structure.entry = entry;
         if (structure.entry.value == 0)
@@ -213,6 +483,7 @@ Result<StructureList> read_mask_folder(const std::string& folder, const std::str
                 append_runs(mask.layers[0], static_cast<std::uint8_t>(place), structure);
         list.structures.push_back(std::move(structure));
     }
+    SONOCASE_TRY_DONE(join_masks(first_grid, places, folder, list));
     // Names that TotalSegmentator does not define get values above its own.
     int next = 1001;
     for (Structure& structure : list.structures)
@@ -344,6 +615,12 @@ PaintCount paint(const std::vector<Structure>& structures, LabelVolume& labels) 
 
 }  // namespace
 
+std::vector<std::string> names_options() {
+    std::vector<std::string> options{"auto", "none"};
+    for (const Numbering& numbering : numberings()) options.emplace_back(numbering.key);
+    return options;
+}
+
 Box3 body_box(const LabelVolume& labels) {
     const Grid& grid = labels.grid;
     Int3 low{grid.size.x, grid.size.y, grid.size.z}, high{-1, -1, -1};
@@ -375,9 +652,13 @@ Result<ImportedLabels> import_label_map(const std::string& path,
         SONOCASE_TRY_DONE(check_source_file(path, "expected a label map"));
     }
     if (path.ends_with(".labels")) return from_stage_file(path);
+    const auto names = names_options();
+    if (std::find(names.begin(), names.end(), options.names) == names.end())
+        return Error{"'" + options.names + "' is no numbering of labels", "names",
+                     suggest_name(options.names, names)};
     report_progress(progress, 0, "reading labels");
-    SONOCASE_TRY(auto list, is_mask_folder(path) ? read_mask_folder(path, options.table)
-                                                 : read_label_file(path, options.table));
+    SONOCASE_TRY(auto list, is_mask_folder(path) ? read_mask_folder(path, options)
+                                                 : read_label_file(path, options));
     std::vector<Structure>& structures = list.structures;
     std::erase_if(structures, [](const Structure& s) { return s.voxels == 0; });
     if (structures.empty())
@@ -391,7 +672,10 @@ Result<ImportedLabels> import_label_map(const std::string& path,
     StageReport& report = result.report;
     report.stage = stage_names::kImport;
     report.version = kImportVersion;
+    report.notes = std::move(list.notes);
     report.warnings = std::move(list.warnings);
+    report.notes = std::move(list.notes);
+    for (Structure& structure : structures) mend_name(structure.entry.name, report.warnings);
     const int unnamed_count = name_unnamed(structures, report.warnings);
     std::stable_sort(
         structures.begin(), structures.end(),
@@ -429,6 +713,8 @@ Result<ImportedLabels> import_label_map(const std::string& path,
         {"body_height_mm", box.extent().z},
         {"body_volume_ml", static_cast<double>(painted.body_voxels) * voxel_ml},
     };
+    if (list.assumed_names > 0)
+        report.measures.push_back({"assumed_names", static_cast<double>(list.assumed_names)});
     report.seconds = watch.seconds();
     report_progress(progress, 1, "labels read");
     return result;

@@ -14,6 +14,7 @@
 #include "formats/base/stage_report.h"
 #include "formats/volume/label_volume.h"
 #include "pipeline/base/progress.h"
+#include "pipeline/import/volume/volume_file.h"
 
 namespace sonocase::pipeline::inline import_volume {
 
@@ -35,8 +36,15 @@ inline std::array<std::uint8_t, 3> label_colour(const std::string& name) {
 }
 
 struct ImportOptions {
-    std::string table;  // CSV of value,name[,tissue_class]; empty: see label_table.h for the order
+    std::string table;  // see label_table.h for its forms, and for what names values without it
     double scale = 1;   // mm per unit of the file, > 0
+    VolumeReading reading;
+    // Names of values that nothing names, one of names_options(). "auto": those of TotalSegmentator
+    // v2 "total", with a warning unless sizes and places of the structures speak for them, and an
+    // error where they speak against them; never where segments or other names show that the map is
+    // numbered otherwise. "none": label_1, label_2, ... Else a numbering, which also comes before
+    // the names in the file.
+    std::string names = "auto";
 };
 
 struct ImportedLabels {
@@ -46,14 +54,20 @@ struct ImportedLabels {
 };
 
 inline constexpr int kImportVersion = 2;
+// Of how volumes are read: part of the key of cached labels.
+inline constexpr int kVolumeReadingVersion = 3;
 
 // path  NIfTI, NRRD, .seg.nrrd, MetaImage; a folder with one binary mask per structure (file name =
-//       structure); a folder with a DICOM series whose pixels are label values; or a .labels file
-//       that import wrote, returned unchanged.
+//       structure); a DICOM segmentation, or a folder with one (beside its CT, or alone) or with a
+//       DICOM series whose pixels are label values; or a .labels file that import wrote, returned
+//       unchanged.
 // The palette holds the labels that occur, in order of value, after [0], the outside. Label::tissue
 // comes from the table's tissue_class, else from the built-in tissue table by the name; a class
 // that does not exist is an error. Where masks or segments overlap the smaller structure remains: a
 // vessel stays in its liver.
+//
+// The report says what was assumed: names by number alone (assumed_names), and by a warning which
+// of two transforms, which axes, which unit.
 //
 // Errors, each with what was found and what to do: no such file; a pipe or a device; unreadable or
 // truncated; no body; two labels of one name; more than 254 labels; an extent that cannot be a
@@ -62,6 +76,9 @@ inline constexpr int kImportVersion = 2;
 Result<ImportedLabels> import_label_map(const std::string& path,
                                         const ImportOptions& options = {},
                                         const Progress& progress = {});
+
+// "auto", "none", and the numberings that are known: "total", "total_v1", "amos", ...
+std::vector<std::string> names_options();
 
 // Bounding box of everything that is not outside, to the outer faces of the voxels, in the
 // volume's frame.

@@ -4,13 +4,19 @@
 // room.
 #pragma once
 
+#include <algorithm>
+#include <cctype>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <map>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "formats/base/result.h"
+#include "formats/base/stage_report.h"
 #include "formats/volume/label_volume.h"
 #include "pipeline/import/volume/volume_file.h"
 
@@ -18,18 +24,76 @@ namespace sonocase::pipeline::inline import_volume {
 
 enum class Component { u8, i8, u16, i16, u32, i32, u64, i64, f32, f64 };
 
-struct NativeVolume {
-    Grid grid;  // RAS+ mm; orthonormal axes in any order and of any handedness
-    Component component = Component::u8;
-    int layers = 1;                // values per voxel, stored side by side
-    std::vector<std::byte> bytes;  // # voxels * layers * size of component
-    std::map<std::string, std::string> fields;
+constexpr std::size_t bytes_of(Component component) {
+    switch (component) {
+        case Component::u8:
+        case Component::i8: return 1;
+        case Component::u16:
+        case Component::i16: return 2;
+        case Component::u32:
+        case Component::i32:
+        case Component::f32: return 4;
+        case Component::u64:
+        case Component::i64:
+        case Component::f64: break;
+    }
+    return 8;
+}
+
+// Where a header says that its voxels lie, RAS+ mm: voxel (i, j, k) at origin + columns * (i, j,
+// k). The axes may have any angles to each other.
+struct Placement {
+    Int3 size{0, 0, 0};
+    Matrix3 columns;
+    Point3 origin_mm;
+    Vector3 spacing_mm{0, 0, 0};  // where the header gives it besides the columns; else 0
     std::vector<std::string> warnings;
 };
 
-VolumeSize size_in_file_header(const std::string& path);            // one file
-Result<NativeVolume> read_itk_volume(const std::string& path);      // one file
-Result<NativeVolume> read_dicom_series(const std::string& folder);  // the folder's largest series
+struct NativeVolume {
+    Grid grid;  // RAS+ mm; orthonormal axes in any order and of any handedness
+    Component component = Component::u8;
+    int layers = 1;       // values per voxel
+    bool planar = false;  // one layer after the other; else the values of a voxel side by side
+    std::vector<std::byte> bytes;      // # voxels * layers * size of component
+    double slope = 1, intercept = 0;   // value = slope * stored + intercept
+    std::optional<Placement> slanted;  // where the voxels lie if not on the grid: to be resampled
+    std::map<std::string, std::string> fields;
+    std::vector<Note> notes;  // what was found and assumed, for the report
+    std::vector<std::string> warnings;
+};
+
+// Whether a path ends like this, in small or capital letters.
+inline bool has_ending(const std::string& path, std::string_view ending) {
+    return path.size() >= ending.size() &&
+           std::equal(
+               ending.begin(), ending.end(), path.end() - std::ssize(ending),
+               [](char a, char b) { return a == std::tolower(static_cast<unsigned char>(b)); });
+}
+inline bool is_nifti_name(const std::string& path) {
+    return has_ending(path, ".nii") || has_ending(path, ".nii.gz");
+}
+
+// Gives the volume the grid of a placement, and its warnings. Axes that are off right angles by
+// less than a tenth of a voxel over the whole volume are squared off about its middle, with a
+// warning that says how far that moves a voxel. Errors: axes of no length; axes farther off, unless
+// the reading resamples them.
+Status place_volume(const Placement& placement,
+                    const VolumeReading& reading,
+                    const std::string& path,
+                    NativeVolume& volume);
+
+// The voxels in the file's type, and a byte for each value, must fit into memory.
+Status check_room(const NativeVolume& volume, std::uint64_t bytes, const std::string& path);
+
+VolumeSize size_in_file_header(const std::string& path);  // one file
+Result<NativeVolume> read_itk_volume(const std::string& path,
+                                     const VolumeReading& reading);  // NRRD or MetaImage
+// A DICOM segmentation or an object of several frames; a folder with one segmentation, beside the
+// scan that it was drawn on or alone; or a folder's largest series. resample_shear: slices of a
+// tilted gantry are moved by whole pixels; else they are an error.
+Result<NativeVolume> read_dicom(const std::string& path, bool resample_shear = false);
+VolumeSize size_in_dicom(const std::string& path);  // by headers alone
 
 // How to permute and flip the axes of a grid so that they lie nearest to those of its frame.
 struct AxisOrder {

@@ -6,11 +6,13 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <type_traits>
 #include <unordered_map>
 
 #include "pipeline/base/source_checks.h"
-#include "pipeline/import/volume/dicom_series.h"
+#include "pipeline/import/volume/dicom_frames.h"
 #include "pipeline/import/volume/native_volume.h"
+#include "pipeline/import/volume/nifti_file.h"
 
 namespace sonocase::pipeline::inline import_volume {
 
@@ -69,19 +71,21 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Result<NativeVolume> read_native(const std::string& path) {
+Result<NativeVolume> read_native(const std::string& path, const VolumeReading& reading) {
     std::error_code code;
     if (fs::is_directory(path, code)) {
         SONOCASE_TRY_DONE(check_source_folder(path, "expected DICOM slices"));
-        return read_dicom_series(path);
+        return read_dicom(path, reading.resample_shear);
     }
-    if (fs::exists(path, code) && !is_volume_file_name(path))
+    SONOCASE_TRY_DONE(check_source_file(path, "expected a volume file"));
+    if (is_dicom_file(path)) return read_dicom(path, reading.resample_shear);
+    if (!is_volume_file_name(path))
         return Error{
             "not a known volume file name", path,
-            "expected .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, a folder of masks or of DICOM "
-            "slices"};
-    SONOCASE_TRY_DONE(check_source_file(path, "expected a volume file"));
-    return read_itk_volume(path);
+            "expected .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, a DICOM segmentation, a folder of "
+            "masks or of DICOM files"};
+    if (is_nifti_name(path)) return read_nifti_volume(path, reading);
+    return read_itk_volume(path, reading);
 }
 
 // Runs use(pointer to the voxels as their own type).
@@ -116,20 +120,38 @@ void walk(const Grid& target, const AxisWalk& walk, Visit visit) {
     }
 }
 
+// How stored numbers become values, and how far from a whole number a value may be.
+struct Scale {
+    double slope = 1, intercept = 0;
+    double tolerance = 1e-3;  // writers that scale labels leave rounding of a few units in 1e7
+    bool plain() const { return slope == 1 && intercept == 0; }
+};
+
+// A writer that scales whole numbers into integers leaves up to half a step of them.
+Scale scale_of(const NativeVolume& volume) {
+    Scale scale{volume.slope, volume.intercept};
+    const bool integers = volume.component != Component::f32 && volume.component != Component::f64;
+    if (integers && !scale.plain())
+        scale.tolerance = std::clamp(0.5001 * std::abs(scale.slope), scale.tolerance, 0.05);
+    return scale;
+}
+
 // The whole number in a voxel; false if the value is not whole, or does not fit.
 template <class T>
-bool whole_number(T value, std::int32_t* whole) {
-    if constexpr (std::is_floating_point_v<T>) {
-        // Writers that pass labels through a scale factor leave rounding of a few units in 1e7.
-        const double rounded = std::nearbyint(static_cast<double>(value));
-        if (!(std::abs(static_cast<double>(value) - rounded) <= 1e-3) || std::abs(rounded) > 2e9)
+bool whole_number(T stored, const Scale& scale, std::int32_t* whole) {
+    if (std::is_floating_point_v<T> || !scale.plain()) {
+        const double value = scale.slope * static_cast<double>(stored) + scale.intercept;
+        const double rounded = std::nearbyint(value);
+        if (!(std::abs(value - rounded) <= scale.tolerance) || std::abs(rounded) > 2e9)
             return false;
         *whole = static_cast<std::int32_t>(rounded);
         return true;
-    } else {
-        *whole = static_cast<std::int32_t>(value);
-        return static_cast<T>(*whole) == value && (*whole < 0) == (value < T{0});
     }
+    if constexpr (std::is_integral_v<T>) {
+        *whole = static_cast<std::int32_t>(stored);
+        return static_cast<T>(*whole) == stored && (*whole < 0) == (stored < T{0});
+    }
+    return false;
 }
 
 // The distinct numbers of a volume, 256 at most, each with its place in order of appearance.
@@ -165,49 +187,119 @@ class ValueTable {
 
 VolumeSize size_in_headers(const std::string& path) {
     std::error_code code;
-    if (!fs::is_directory(path, code)) return size_in_file_header(path);
+    if (!fs::is_directory(path, code))
+        return check_source_file(path, "") && is_dicom_file(path) ? size_in_dicom(path)
+                                                                  : size_in_file_header(path);
     if (!check_source_folder(path, "")) return {};
     for (const auto& entry : fs::directory_iterator(path, code))
         if (is_volume_file_name(entry.path().string()))
             return size_in_file_header(entry.path().string());
-    const auto stack = dicom_stack(read_dicom_headers(path), path);
-    if (!stack) return {};
-    VolumeSize size;
-    for (const DicomSlice& slice : stack->slices)
-        size.voxels += static_cast<std::uint64_t>(slice.rows) *
-                       static_cast<std::uint64_t>(slice.columns) *
-                       static_cast<std::uint64_t>(slice.frames);
-    size.bytes = 2 * size.voxels;  // CT and most others have two bytes per voxel
-    return size;
+    return size_in_dicom(path);
 }
 
-Result<LabelLayers> read_label_layers(const std::string& path) {
-    SONOCASE_TRY(auto native, read_native(path));
+namespace {
+
+// A grid with right angles along the axes of `squared` that covers a slanted volume.
+Grid covering_grid(const Grid& squared, const Placement& slanted) {
+    Grid grid = squared;
+    Box3 box;  // in voxels of the squared grid
+    for (int corner = 0; corner < 8; ++corner) {
+        const Vector3 voxel{(corner & 1) ? slanted.size.x - 1.0 : 0,
+                            (corner & 2) ? slanted.size.y - 1.0 : 0,
+                            (corner & 4) ? slanted.size.z - 1.0 : 0};
+        box.include(squared.voxel_from_point(slanted.origin_mm + slanted.columns * voxel));
+    }
+    Point3 first;
+    for (int axis = 0; axis < 3; ++axis) {
+        first[axis] = std::floor(box.lower[axis]);
+        grid.size[axis] = static_cast<std::int32_t>(std::ceil(box.upper[axis]) - first[axis]) + 1;
+    }
+    grid.origin_mm = squared.point_from_voxel(first);
+    return grid;
+}
+
+// Visits every voxel of the target grid with the number of the slanted volume's nearest voxel; -1
+// beyond its ends.
+template <class Visit>
+void walk_slanted(const Grid& target, const Placement& slanted, Visit visit) {
+    const Matrix3 to_voxel = inverse(slanted.columns);
+    std::size_t number = 0;
+    for (int k = 0; k < target.size.z; ++k)
+        for (int j = 0; j < target.size.y; ++j)
+            for (int i = 0; i < target.size.x; ++i) {
+                const Point3 at = target.point_from_voxel({double(i), double(j), double(k)});
+                const Vector3 v = to_voxel * (at - slanted.origin_mm);
+                std::ptrdiff_t from = 0, stride = 1;
+                for (int axis = 0; axis < 3; ++axis) {
+                    const long n = std::lround(v[axis]);
+                    if (n < 0 || n >= slanted.size[axis]) from = -1;
+                    if (from >= 0) from += n * stride;
+                    stride *= slanted.size[axis];
+                }
+                visit(number++, from);
+            }
+}
+
+}  // namespace
+
+Result<LabelLayers> read_label_layers(const std::string& path, const VolumeReading& reading) {
+    SONOCASE_TRY(auto native, read_native(path, reading));
+    const std::size_t voxel_count = native.grid.voxel_count();  // of each layer of the file
+    if (native.slanted) native.grid = covering_grid(native.grid, *native.slanted);
     const AxisOrder order = canonical_axes(native.grid.direction);
     const AxisWalk steps = axis_walk(native.grid, order);
 
     LabelLayers result;
     result.grid = reoriented(native.grid, order);
     result.fields = std::move(native.fields);
+    result.notes = std::move(native.notes);
     result.warnings = std::move(native.warnings);
     const auto layer_count = static_cast<std::size_t>(native.layers);
+    const std::size_t voxel_step = native.planar ? 1 : layer_count;
+    const std::size_t layer_step = native.planar ? voxel_count : 1;
     result.layers.assign(layer_count, std::vector<std::uint8_t>(result.grid.voxel_count()));
 
     ValueTable table;
     enum { kFine, kTooMany, kNotWhole } verdict = kFine;
+    const Scale scale = scale_of(native);
     with_voxels(native, [&](const auto* voxels) {
+        using Stored = std::remove_cvref_t<decltype(*voxels)>;
         for (std::size_t layer = 0; layer < layer_count && verdict == kFine; ++layer) {
             std::uint8_t* target = result.layers[layer].data();
-            walk(result.grid, steps, [&](std::size_t to, std::size_t from) {
-                if (verdict != kFine) return;
+            const Stored* of_layer = voxels + layer * layer_step;
+            // Neighbours mostly hold the same number.
+            Stored last{};
+            int last_place = -1;
+            const auto place_of = [&](Stored stored) {
                 std::int32_t value = 0;
-                if (!whole_number(voxels[from * layer_count + layer], &value)) {
+                if (!whole_number(stored, scale, &value)) {
                     verdict = kNotWhole;
-                    return;
+                    return 0;
                 }
                 const int place = table.place(value);
                 if (place < 0) verdict = kTooMany;
-                target[to] = static_cast<std::uint8_t>(place);
+                return place;
+            };
+            const auto visit = [&](std::size_t to, std::size_t from) {
+                const Stored stored = of_layer[from * voxel_step];
+                if (last_place < 0 || stored != last) {
+                    if (verdict != kFine) return;
+                    last = stored;
+                    last_place = place_of(stored);
+                }
+                target[to] = static_cast<std::uint8_t>(last_place);
+            };
+            if (!native.slanted) {
+                walk(result.grid, steps, visit);
+                continue;
+            }
+            walk_slanted(result.grid, *native.slanted, [&](std::size_t to, std::ptrdiff_t from) {
+                if (from >= 0)
+                    visit(to, static_cast<std::size_t>(from));
+                else if (const int outside = table.place(0); outside >= 0)
+                    target[to] = static_cast<std::uint8_t>(outside);
+                else
+                    verdict = kTooMany;
             });
         }
     });

@@ -3,16 +3,17 @@
 #include "pipeline/import/volume/volume_header.h"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
-#include <cstring>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <memory>
+#include <map>
+#include <vector>
 
 #include <zlib.h>
 
 #include "formats/files/atomic_file.h"
+#include "pipeline/base/memory_limit.h"
 #include "pipeline/base/source_checks.h"
 #include "pipeline/base/text.h"
 
@@ -91,14 +92,14 @@ MetaHeader read_meta_header(const std::string& path) {
 }
 
 Status check_data_files(const std::string& path) {
-    if (path.ends_with(".mha") || path.ends_with(".mhd")) {
+    if (has_ending(path, ".mha") || has_ending(path, ".mhd")) {
         const MetaHeader header = read_meta_header(path);
         if (header.many_files) return check_source_folder(folder_of(path), kExpected);
         // A header that is cut off names no file: the reader reports it.
         if (header.data_path.empty() || header.data_path == path) return Done{};
         return check_data_file(path, header.data_path);
     }
-    if (path.ends_with(".nrrd") || path.ends_with(".nhdr")) {
+    if (has_ending(path, ".nrrd") || has_ending(path, ".nhdr")) {
         const std::string data_file = nrrd_data_file(path);
         if (data_file.empty()) return Done{};
         if (names_many_files(data_file)) return check_source_folder(folder_of(path), kExpected);
@@ -145,7 +146,7 @@ std::uint64_t inflated_bytes(const std::vector<std::uint8_t>& packed,
 }  // namespace
 
 Status check_meta_length(const std::string& path, std::uint64_t voxel_bytes) {
-    if (!path.ends_with(".mha") && !path.ends_with(".mhd")) return Done{};
+    if (!has_ending(path, ".mha") && !has_ending(path, ".mhd")) return Done{};
     const MetaHeader header = read_meta_header(path);
     if (header.many_files) return Done{};  // one file per slice: the reader misses absent ones
     std::error_code code;
@@ -165,7 +166,7 @@ Status check_meta_length(const std::string& path, std::uint64_t voxel_bytes) {
 }
 
 Status check_nrrd_length(const std::string& path, std::uint64_t voxel_bytes) {
-    if (!path.ends_with(".nrrd")) return Done{};
+    if (!has_ending(path, ".nrrd")) return Done{};
     SONOCASE_TRY(const auto bytes, read_file(path));
     // Lines up to an empty one; "data file" means that the voxels are elsewhere.
     bool gzip = false;
@@ -175,8 +176,9 @@ Status check_nrrd_length(const std::string& path, std::uint64_t voxel_bytes) {
         std::string line(bytes.begin() + static_cast<std::ptrdiff_t>(at), end);
         at = static_cast<std::size_t>(end - bytes.begin()) + 1;
         if (!line.empty() && line.back() == '\r') line.pop_back();
-        if (line.starts_with("data file:") || line.starts_with("datafile:")) return Done{};
-        if (line == "encoding: gzip" || line == "encoding: gz") gzip = true;
+        const std::string lower = lower_case(line);
+        if (lower.starts_with("data file:") || lower.starts_with("datafile:")) return Done{};
+        if (lower == "encoding: gzip" || lower == "encoding: gz") gzip = true;
         if (!line.empty()) continue;
         if (!gzip) return Done{};  // the reader counts raw bytes itself
         const std::uint64_t found = inflated_bytes(bytes, std::min(at, bytes.size()), voxel_bytes);
@@ -188,121 +190,419 @@ Status check_nrrd_length(const std::string& path, std::uint64_t voxel_bytes) {
 
 namespace {
 
-struct CloseGz {
-    void operator()(gzFile_s* file) const { gzclose(file); }
-};
+constexpr const char* kWriteAgain = "write the volume again with its geometry in the header";
 
-std::int32_t int_at(const std::uint8_t* bytes, bool swapped) {
-    std::array<std::uint8_t, 4> b{bytes[0], bytes[1], bytes[2], bytes[3]};
-    if (swapped) std::reverse(b.begin(), b.end());
-    std::int32_t value = 0;
-    std::memcpy(&value, b.data(), 4);
-    return value;
+Error not_finite(const std::string& field, const std::string& path) {
+    return {"geometry in the header is not a number (" + field + ")", path, kWriteAgain};
 }
 
-// NIfTI-1 has 348 bytes of header, NIfTI-2 540; then four bytes of which the first says whether
-// extensions follow; each is its size (with these eight bytes), a code and its content. The voxels
-// begin at vox_offset: a float at byte 108, or in NIfTI-2 a 64-bit number at 168.
-struct NiftiHeader {
-    std::int64_t size = 0;  // 0: not a NIfTI file
-    bool swapped = false;
-    bool has_extensions = false;
-    bool has_orientation = false;  // qform_code or sform_code is not 0
-    std::int64_t voxels_at = 0;
-};
-
-bool read_bytes(gzFile_s* file, std::uint8_t* to, std::size_t count) {
-    return gzread(file, to, static_cast<unsigned>(count)) == static_cast<int>(count);
+std::vector<std::string> words_of(std::string_view text) {
+    std::vector<std::string> words;
+    std::string word;
+    for (const char c : text) {
+        if (std::isspace(static_cast<unsigned char>(c)) == 0) {
+            word += c;
+        } else if (!word.empty()) {
+            words.push_back(std::move(word));
+            word.clear();
+        }
+    }
+    if (!word.empty()) words.push_back(std::move(word));
+    return words;
 }
 
-NiftiHeader read_header(gzFile_s* file) {
-    NiftiHeader header;
-    std::vector<std::uint8_t> bytes(4);
-    if (!read_bytes(file, bytes.data(), 4)) return header;
-    std::int32_t size = int_at(bytes.data(), false);
-    if (size != 348 && size != 540) {
-        header.swapped = true;
-        size = int_at(bytes.data(), true);
+// `count` finite numbers in a field; 0: any number of them.
+Result<std::vector<double>> finite_numbers(const std::vector<std::string>& cells,
+                                           std::size_t count,
+                                           const std::string& field,
+                                           const std::string& path) {
+    std::vector<double> numbers;
+    for (const std::string& cell : cells) {
+        const auto number = number_in(cell);
+        if (!number || !std::isfinite(*number)) return not_finite(field, path);
+        numbers.push_back(*number);
     }
-    if (size != 348 && size != 540) return header;
-    bytes.resize(static_cast<std::size_t>(size) + 4);
-    if (!read_bytes(file, bytes.data() + 4, bytes.size() - 4)) return header;
-    header.size = size;
-    header.has_extensions = bytes[size] != 0;
-    const auto first_code = bytes.begin() + (size == 348 ? 252 : 344);  // two codes side by side
-    header.has_orientation = std::any_of(first_code, first_code + (size == 348 ? 4 : 8),
-                                         [](std::uint8_t byte) { return byte != 0; });
-    if (size == 348) {
-        const std::int32_t bits = int_at(bytes.data() + 108, header.swapped);
-        float offset = 0;
-        std::memcpy(&offset, &bits, 4);
-        header.voxels_at = offset >= 352 && offset < 2e9f ? static_cast<std::int64_t>(offset) : 352;
-    } else {
-        header.voxels_at = int_at(bytes.data() + (header.swapped ? 172 : 168), header.swapped);
+    if (count > 0 && numbers.size() != count)
+        return Error{field + " of the header holds " + std::to_string(numbers.size()) +
+                         " numbers and not " + std::to_string(count),
+                     path, kWriteAgain};
+    return numbers;
+}
+
+std::string sizes_text(const std::vector<double>& sizes) {
+    std::string text;
+    for (const double size : sizes)
+        text += (text.empty() ? "" : " x ") + std::to_string(static_cast<long long>(size));
+    return text;
+}
+
+Status check_sizes(const std::vector<double>& sizes, const char* field, const std::string& path) {
+    for (const double size : sizes)
+        if (size != std::floor(size) || size < 1 || size > 65535)
+            return Error{text("%s of the header holds %g", field, size), path,
+                         "expected 1 to 65535 voxels per side"};
+    return Done{};
+}
+
+// Millimetres per unit that a header names; 0 for words that are none.
+double unit_in_mm(std::string unit) {
+    std::erase(unit, '"');
+    unit = lower_case(trimmed(unit));
+    if (unit.empty() || unit == "mm" || unit == "???" || unit == "none" ||
+        unit.starts_with("millimet"))
+        return 1;
+    if (unit == "m" || unit.starts_with("met")) return 1000;
+    if (unit == "cm" || unit.starts_with("centimet")) return 10;
+    if (unit == "um" || unit == "\xc2\xb5m" || unit.starts_with("micro")) return 0.001;
+    return 0;
+}
+
+Status scale_to_mm(const std::string& unit,
+                   const char* field,
+                   const std::string& path,
+                   Placement& placement) {
+    const double factor = unit_in_mm(unit);
+    if (factor == 0)
+        return Error{std::string(field) + " of the header names the unit " + unit, path,
+                     "expected mm; write the geometry in millimetres"};
+    if (factor == 1) return Done{};
+    for (double& entry : placement.columns.m) entry *= factor;
+    placement.spacing_mm = factor * placement.spacing_mm;
+    for (int axis = 0; axis < 3; ++axis) placement.origin_mm[axis] *= factor;
+    placement.warnings.push_back(text("the header says %s (%s): its numbers are multiplied by %g",
+                                      unit.c_str(), field, factor));
+    return Done{};
+}
+
+const char* kNoOrientation =
+    "the file does not say how its axes lie in the patient (%s), so right and left may be "
+    "exchanged: its axes are taken to run to the left, to the back and to the head; check on which "
+    "side the liver is, or export the file again with its orientation";
+
+// "(1,0,0) none (0,1,0)": an empty vector for "none".
+std::vector<std::vector<std::string>> vectors_in(std::string_view text) {
+    std::vector<std::vector<std::string>> vectors;
+    while (true) {
+        text = trimmed(text);
+        if (text.empty()) return vectors;
+        std::vector<std::string> cells;
+        if (text.front() == '(') {
+            const std::size_t end = std::min(text.find(')'), text.size());
+            std::string_view inside = text.substr(1, end - 1);
+            while (true) {
+                const std::size_t comma = inside.find(',');
+                cells.emplace_back(trimmed(inside.substr(0, comma)));
+                if (comma == std::string_view::npos) break;
+                inside.remove_prefix(comma + 1);
+            }
+            text.remove_prefix(std::min(end + 1, text.size()));
+        } else {
+            const std::size_t end = std::min(text.find_first_of(" \t("), text.size());
+            if (lower_case(text.substr(0, end)) != "none") cells.emplace_back(text.substr(0, end));
+            text.remove_prefix(end);
+        }
+        vectors.push_back(std::move(cells));
     }
-    return header;
+}
+
+// The fields of an NRRD header, without blanks and in lower case: "spacedirections".
+std::map<std::string, std::string> nrrd_fields(std::string_view header) {
+    std::map<std::string, std::string> fields;
+    while (!header.empty()) {
+        const std::size_t end = std::min(header.find('\n'), header.size());
+        const std::string_view line = trimmed(header.substr(0, end));
+        header.remove_prefix(std::min(end + 1, header.size()));
+        if (line.empty()) break;
+        const std::size_t colon = line.find(": ");
+        if (line.front() == '#' || colon == std::string_view::npos) continue;
+        if (line.find(":=") < colon) continue;  // a key of the writer's own
+        std::string key = lower_case(line.substr(0, colon));
+        std::erase(key, ' ');
+        fields.emplace(std::move(key), std::string(trimmed(line.substr(colon + 1))));
+    }
+    return fields;
+}
+
+bool is_nothing(const std::vector<std::string>& cells) {
+    return std::all_of(cells.begin(), cells.end(), [](const std::string& cell) {
+        const auto number = number_in(cell);
+        return number && std::isnan(*number);
+    });
 }
 
 }  // namespace
 
-Result<LabelTable> load_nifti_label_table(const std::string& path) {
-    constexpr std::int32_t kMax = 16 << 20;
-    const std::unique_ptr<gzFile_s, CloseGz> file(gzopen(path.c_str(), "rb"));
-    if (!file) return LabelTable{};
-    const NiftiHeader header = read_header(file.get());
-    if (!header.has_extensions) return LabelTable{};
-    std::int64_t at = header.size + 4;
-    while (at + 8 <= header.voxels_at) {
-        std::uint8_t head[8];
-        if (!read_bytes(file.get(), head, 8)) break;
-        const std::int32_t length = int_at(head, header.swapped);
-        if (length < 8 || length > kMax || at + length > header.voxels_at) break;
-        std::string content(static_cast<std::size_t>(length) - 8, '\0');
-        if (!read_bytes(file.get(), reinterpret_cast<std::uint8_t*>(content.data()),
-                        content.size()))
+Result<Placement> nrrd_placement(std::string_view header, const std::string& path) {
+    const auto fields = nrrd_fields(header);
+    const auto field = [&](const char* key) {
+        const auto found = fields.find(key);
+        return found == fields.end() ? std::string() : found->second;
+    };
+    const std::string encoding = lower_case(field("encoding"));
+    if (encoding == "bzip2" || encoding == "bz2")
+        return Error{"its voxels are packed with bzip2", path,
+                     "save it with gzip or without compression"};
+    SONOCASE_TRY(const auto sizes, finite_numbers(words_of(field("sizes")), 0, "sizes", path));
+    SONOCASE_TRY_DONE(check_sizes(sizes, "sizes", path));
+    const auto vectors = vectors_in(field("spacedirections"));
+    const std::vector<std::string> kinds = words_of(lower_case(field("kinds")));
+    if (!vectors.empty() && vectors.size() != sizes.size())
+        return Error{"space directions of the header are " + std::to_string(vectors.size()) +
+                         " and there are " + std::to_string(sizes.size()) + " axes",
+                     path, kWriteAgain};
+    // The axes of space among those of the array.
+    std::vector<std::size_t> spatial;
+    for (std::size_t axis = 0; axis < sizes.size(); ++axis) {
+        const bool known_kind = axis < kinds.size() && kinds[axis] != "???";
+        const bool in_space = !vectors.empty() ? !(sizes.size() > 3 && is_nothing(vectors[axis]))
+                              : known_kind     ? kinds[axis] == "domain" || kinds[axis] == "space"
+                                               : true;
+        if (in_space) spatial.push_back(axis);
+    }
+    if (sizes.size() < 3)
+        return Error{"an image of " + sizes_text(sizes) + " pixels", path,
+                     "expected a volume of three dimensions"};
+    if (spatial.size() != 3)
+        return Error{"volume of " + sizes_text(sizes) + " voxels", path,
+                     "expected three dimensions; export one time step"};
+
+    Placement placement;
+    std::vector<double> spacings;
+    const std::vector<std::string> spacing_cells = words_of(field("spacings"));
+    for (std::size_t n = 0; n < 3; ++n) {
+        const std::size_t axis = spatial[n];
+        placement.size[static_cast<int>(n)] = static_cast<std::int32_t>(sizes[axis]);
+        if (axis >= spacing_cells.size()) continue;
+        SONOCASE_TRY(const auto one, finite_numbers({spacing_cells[axis]}, 1, "spacings", path));
+        if (!(one[0] > 0))
+            return Error{text("spacings of the header holds %g", one[0]), path,
+                         "expected voxel sizes above 0"};
+        spacings.push_back(one[0]);
+    }
+    const std::string space = lower_case(field("space"));
+    double sign[3] = {-1, -1, 1};
+    bool known_space = true;
+    if (space == "right-anterior-superior" || space == "ras") {
+        sign[0] = sign[1] = 1;
+    } else if (space == "left-anterior-superior" || space == "las") {
+        sign[1] = 1;
+    } else if (space != "left-posterior-superior" && space != "lps") {
+        known_space = false;
+    }
+    if (!vectors.empty()) {
+        for (std::size_t n = 0; n < 3; ++n) {
+            SONOCASE_TRY(const auto vector,
+                         finite_numbers(vectors[spatial[n]], 3, "space directions", path));
+            for (int row = 0; row < 3; ++row)
+                placement.columns(row, static_cast<int>(n)) =
+                    sign[row] * vector[static_cast<std::size_t>(row)];
+        }
+        const auto origins = vectors_in(field("spaceorigin"));
+        if (!origins.empty()) {
+            SONOCASE_TRY(const auto origin, finite_numbers(origins[0], 3, "space origin", path));
+            for (int row = 0; row < 3; ++row)
+                placement.origin_mm[row] = sign[row] * origin[static_cast<std::size_t>(row)];
+        }
+        if (!known_space)
+            placement.warnings.push_back(
+                text(kNoOrientation, space.empty() ? "no space" : ("space " + space).c_str()));
+        for (std::size_t n = 0; n < spacings.size(); ++n) {
+            const double length = norm(placement.columns.column(static_cast<int>(n)));
+            if (std::abs(length - spacings[n]) * sizes[spatial[n]] > 0.5 * length)
+                placement.warnings.push_back(
+                    text("voxels are %g mm along axis %zu by space directions and %g by spacings: "
+                         "the directions are taken",
+                         length, spatial[n] + 1, spacings[n]));
+        }
+    } else {
+        const bool sized = spacings.size() == 3;
+        const std::vector<std::string> minima = words_of(field("axismins"));
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto n = static_cast<std::size_t>(axis);
+            for (int row = 0; row < 3; ++row)
+                placement.columns(row, axis) =
+                    row == axis ? (axis < 2 ? -1 : 1) * (sized ? spacings[n] : 1) : 0;
+            if (spatial[n] >= minima.size()) continue;
+            const auto least = number_in(minima[spatial[n]]);
+            if (least && std::isfinite(*least))
+                placement.origin_mm[axis] = (axis < 2 ? -1 : 1) * *least;
+        }
+        placement.warnings.push_back(text(kNoOrientation, "no space directions"));
+        if (!sized)
+            placement.warnings.push_back(
+                "the header gives no voxel size (space directions, spacings): 1 mm is assumed; "
+                "write the file again with it, or give --scale");
+    }
+    // A quoted unit per axis of space: all must be the same one.
+    const std::vector<std::string> units = words_of(field("spaceunits"));
+    if (!units.empty()) {
+        for (const std::string& unit : units)
+            if (unit_in_mm(unit) != unit_in_mm(units[0]))
+                return Error{"space units of the header differ between axes", path, kWriteAgain};
+        SONOCASE_TRY_DONE(scale_to_mm(units[0], "space units", path, placement));
+    }
+    return placement;
+}
+
+Result<Placement> meta_placement(std::string_view header, const std::string& path) {
+    std::map<std::string, std::string> fields;
+    while (!header.empty()) {
+        const std::size_t end = std::min(header.find('\n'), header.size());
+        const std::string_view line = header.substr(0, end);
+        header.remove_prefix(std::min(end + 1, header.size()));
+        const std::size_t equals = line.find('=');
+        if (equals == std::string_view::npos) continue;
+        const std::string key = lower_case(trimmed(line.substr(0, equals)));
+        fields.emplace(key, std::string(trimmed(line.substr(equals + 1))));
+        if (key == "elementdatafile") break;
+    }
+    // The first of several names of one field: its name, and its value.
+    const auto field = [&](std::initializer_list<const char*> names) {
+        for (const char* name : names)
+            if (const auto found = fields.find(lower_case(name)); found != fields.end())
+                return std::pair{std::string(name), found->second};
+        return std::pair{std::string(), std::string()};
+    };
+    SONOCASE_TRY(const auto sizes,
+                 finite_numbers(words_of(field({"DimSize"}).second), 0, "DimSize", path));
+    SONOCASE_TRY_DONE(check_sizes(sizes, "DimSize", path));
+    const std::size_t dimensions = sizes.size();
+    if (dimensions < 3)
+        return Error{"an image of " + sizes_text(sizes) + " pixels", path,
+                     "expected a volume of three dimensions"};
+    for (std::size_t d = 3; d < dimensions; ++d)
+        if (sizes[d] != 1)
+            return Error{"volume of " + sizes_text(sizes) + " voxels", path,
+                         "expected three dimensions; export one time step"};
+    Placement placement;
+    const auto [spacing_name, spacing_text] = field({"ElementSpacing", "ElementSize"});
+    const auto [origin_name, origin_text] = field({"Offset", "Position", "Origin"});
+    const auto [matrix_name, matrix_text] = field({"TransformMatrix", "Rotation", "Orientation"});
+    std::vector<double> spacing(dimensions, 1.0), origin(dimensions, 0.0), matrix;
+    if (!spacing_name.empty()) {
+        SONOCASE_TRY(spacing,
+                     finite_numbers(words_of(spacing_text), dimensions, spacing_name, path));
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            if (!(spacing[axis] > 0))
+                return Error{text("%s of the header holds %g", spacing_name.c_str(), spacing[axis]),
+                             path, "expected voxel sizes above 0"};
+    } else {
+        placement.warnings.push_back(
+            "the header gives no voxel size (ElementSpacing): 1 mm is assumed; write the file "
+            "again with it, or give --scale");
+    }
+    if (!origin_name.empty()) {
+        SONOCASE_TRY(origin, finite_numbers(words_of(origin_text), dimensions, origin_name, path));
+    }
+    if (!matrix_name.empty()) {
+        SONOCASE_TRY(matrix, finite_numbers(words_of(matrix_text), dimensions * dimensions,
+                                            matrix_name, path));
+    } else {
+        placement.warnings.push_back(text(kNoOrientation, "no TransformMatrix"));
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+        const auto a = static_cast<std::size_t>(axis);
+        placement.size[axis] = static_cast<std::int32_t>(sizes[a]);
+        placement.spacing_mm[axis] = spacing[a];
+        placement.origin_mm[axis] = (axis < 2 ? -1 : 1) * origin[a];
+        Vector3 along{axis == 0 ? -1.0 : 0, axis == 1 ? -1.0 : 0, axis == 2 ? 1.0 : 0};
+        if (!matrix.empty())
+            along = {-matrix[a * dimensions], -matrix[a * dimensions + 1],
+                     matrix[a * dimensions + 2]};
+        if (std::abs(norm(along) - 1) > 1e-3)
+            return Error{text("axis %d of %s is of length %g and not 1", axis + 1,
+                              matrix_name.c_str(), norm(along)),
+                         path, "write directions of length 1, and sizes in ElementSpacing"};
+        for (int row = 0; row < 3; ++row) placement.columns(row, axis) = spacing[a] * along[row];
+    }
+    SONOCASE_TRY_DONE(
+        scale_to_mm(field({"DistanceUnits"}).second, "DistanceUnits", path, placement));
+    return placement;
+}
+
+Result<Placement> placement_in_header(const std::string& path) {
+    constexpr std::size_t kMaxHeader = 16 << 20;
+    const bool meta = has_ending(path, ".mha") || has_ending(path, ".mhd");
+    std::ifstream file(path, std::ios::binary);
+    std::string header, line;
+    while (header.size() < kMaxHeader && std::getline(file, line)) {
+        header += line + "\n";
+        if (meta ? lower_case(trimmed(line)).starts_with("elementdatafile") : trimmed(line).empty())
             break;
-        at += length;
-        SONOCASE_TRY(auto table, parse_label_xml(content, path));
-        if (!table.empty()) return table;
     }
-    return LabelTable{};
+    return meta ? meta_placement(header, path) : nrrd_placement(header, path);
 }
 
-std::string nifti_orientation_warning(const std::string& path) {
-    if (!path.ends_with(".nii") && !path.ends_with(".nii.gz")) return "";
-    const std::unique_ptr<gzFile_s, CloseGz> file(gzopen(path.c_str(), "rb"));
-    if (!file) return "";
-    const NiftiHeader header = read_header(file.get());
-    if (header.size == 0 || header.has_orientation) return "";
-    return "the file does not say how its axes lie in the patient (qform_code and sform_code are "
-           "0), so right and left may be exchanged: check on which side the liver is, or export "
-           "the file again with its orientation";
-}
-
-Status check_nifti_length(const std::string& path, std::uint64_t voxel_bytes) {
-    if (!path.ends_with(".nii") && !path.ends_with(".nii.gz")) return Done{};
-    const char* todo = "the file is cut off or damaged; copy or export it again";
-    const std::unique_ptr<gzFile_s, CloseGz> file(gzopen(path.c_str(), "rb"));
-    if (!file) return Error{"cannot open", path, "check that it may be read"};
-    gzbuffer(file.get(), 1 << 18);
-    const NiftiHeader header = read_header(file.get());
-    if (header.size == 0) return Done{};  // an older format that ITK knows and this code does not
-    std::uint64_t position = static_cast<std::uint64_t>(header.size) + 4;
-    const std::uint64_t needed = static_cast<std::uint64_t>(header.voxels_at) + voxel_bytes;
-    std::vector<std::uint8_t> buffer(1 << 20);
-    for (;;) {
-        const int count = gzread(file.get(), buffer.data(), static_cast<unsigned>(buffer.size()));
-        if (count > 0) position += static_cast<std::uint64_t>(count);
-        if (count < static_cast<int>(buffer.size())) break;
+Status place_volume(const Placement& placement,
+                    const VolumeReading& reading,
+                    const std::string& path,
+                    NativeVolume& volume) {
+    Grid& grid = volume.grid;
+    grid.size = placement.size;
+    Matrix3 direction;
+    for (int axis = 0; axis < 3; ++axis) {
+        const Vector3 column = placement.columns.column(axis);
+        const double length = norm(column);
+        if (!(length > 1e-9) || !std::isfinite(length))
+            return Error{text("voxels have the size %g mm along axis %d", length, axis + 1), path,
+                         kWriteAgain};
+        const double given = placement.spacing_mm[axis];
+        grid.spacing_mm[axis] = given > 0 ? given : length;
+        for (int row = 0; row < 3; ++row) direction(row, axis) = column[row] / length;
     }
-    int code = Z_OK;
-    gzerror(file.get(), &code);
-    if (position < needed)
-        return Error{"holds " + std::to_string(position) + " bytes of the " +
-                         std::to_string(needed) + " that its header asks for",
-                     path, todo};
-    if (code != Z_OK && code != Z_STREAM_END) return Error{"damaged compression", path, todo};
+    grid.direction = direction;
+    grid.origin_mm = placement.origin_mm;
+    volume.warnings.insert(volume.warnings.end(), placement.warnings.begin(),
+                           placement.warnings.end());
+    if (orthonormality_error(direction) < 1e-6) return Done{};
+
+    const double side = determinant(direction);
+    if (!(std::abs(side) > 1e-3))
+        return Error{"two axes of the header run along each other", path, kWriteAgain};
+    Matrix3 mirror;
+    mirror(0, 0) = side < 0 ? -1 : 1;
+    const Matrix3 square = nearest_rotation(direction * mirror) * mirror;
+    Vector3 half;
+    for (int axis = 0; axis < 3; ++axis)
+        half[axis] = 0.5 * grid.spacing_mm[axis] * (grid.size[axis] - 1);
+    double moved = 0;
+    for (int corner = 0; corner < 4; ++corner) {  // the other four are their mirror images
+        const Vector3 to{half.x, (corner & 1) ? half.y : -half.y, (corner & 2) ? half.z : -half.z};
+        moved = std::max(moved, norm(direction * to - square * to));
+    }
+    const double shortest = std::min({grid.spacing_mm.x, grid.spacing_mm.y, grid.spacing_mm.z});
+    grid.origin_mm = placement.origin_mm + (direction * half - square * half);
+    grid.direction = square;
+    if (moved <= 0.1 * shortest) {
+        if (moved > 0.01 * shortest)
+            volume.warnings.push_back(
+                text("voxel axes are not quite at right angles and were squared off about the "
+                     "middle, which moves voxels by up to %.2g mm",
+                     moved));
+        return Done{};
+    }
+    if (!reading.resample_shear)
+        return Error{text("voxel axes are not at right angles: squaring them off would move voxels "
+                          "by %.3g mm (a tilted gantry?)",
+                          moved),
+                     path,
+                     "give --resample-shear, or resample the volume to an orthogonal grid (Slicer: "
+                     "Resample Image)"};
+    volume.slanted = placement;
+    volume.warnings.push_back(
+        text("voxel axes are not at right angles (squaring them off would move voxels by %.3g mm): "
+             "the labels were resampled, each voxel from the nearest one",
+             moved));
     return Done{};
+}
+
+Status check_room(const NativeVolume& volume, std::uint64_t bytes, const std::string& path) {
+    const double values = static_cast<double>(volume.grid.voxel_count()) * volume.layers;
+    const double mb = (static_cast<double>(bytes) + values) / 1e6;
+    if (mb <= memory_limit_mb()) return Done{};
+    return Error{text("its %.0f million voxels take %.0f MB, and there are %.0f MB", values / 1e6,
+                      mb, memory_limit_mb()),
+                 path, "a coarser or cropped label map, or more memory"};
 }
 
 }  // namespace sonocase::pipeline::inline import_volume

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What this room reads of a volume's header itself: where the voxels are that the header keeps in
-// other files, whether all of them are there, its orientation and its table of labels.
+// What this room reads of the text headers of NRRD and MetaImage itself: where the voxels lie in
+// the patient, which files hold them, and whether all of them are there.
 #pragma once
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include "formats/base/result.h"
-#include "pipeline/anatomy/label_table.h"
+#include "pipeline/import/volume/native_volume.h"
 
 namespace sonocase::pipeline::inline import_volume {
 
@@ -26,19 +27,19 @@ MetaHeader read_meta_header(const std::string& path);
 // `path` itself must have passed check_source_file. Any other format: Done.
 Status check_data_files(const std::string& path);
 
+// Where the text of an NRRD or MetaImage header places the voxels. Warnings: no orientation or no
+// voxel size, and what is assumed; another unit than millimetres; two sizes that disagree. Errors,
+// each naming the field: a number that is not finite or not there; a volume that is not of three
+// dimensions.
+Result<Placement> nrrd_placement(std::string_view header, const std::string& path);
+Result<Placement> meta_placement(std::string_view header, const std::string& path);
+// Of a file whose name ends in .nrrd, .nhdr, .mha or .mhd.
+Result<Placement> placement_in_header(const std::string& path);
+
 // An Error if the file holds fewer than `voxel_bytes` after its header, or is damaged gzip; Done
-// for files of another format. The library below ITK fills what is missing in a NIfTI file with
-// zeros, and its NRRD reader does not notice that the end of a compressed stream is missing.
-Status check_nifti_length(const std::string& path, std::uint64_t voxel_bytes);
+// for files of another format. The library below ITK does not notice in a compressed NRRD file that
+// the end of the stream is missing.
 Status check_meta_length(const std::string& path, std::uint64_t voxel_bytes);
 Status check_nrrd_length(const std::string& path, std::uint64_t voxel_bytes);  // if compressed
-
-// A warning where a NIfTI file says nothing about its orientation (qform_code and sform_code are
-// 0), so that right and left are a guess; empty for any other file.
-std::string nifti_orientation_warning(const std::string& path);
-
-// The label table in the extension of a NIfTI header (parse_label_xml); empty if the file has none.
-// A damaged header is reported by the reader of the volume instead. Error: a damaged table.
-Result<LabelTable> load_nifti_label_table(const std::string& path);
 
 }  // namespace sonocase::pipeline::inline import_volume

@@ -109,6 +109,8 @@ struct QuadraticTrust {
     double fitted_mm = 0;    // root of the mean squared gap, gaps beyond 8 mm counted as 8
     double held_out_mm = 0;  // the same, but fitted without the patch of each gap
     double inside_mm = 0;    // expected error inside the body, root mean square
+    // Maps that explain the gaps as well, drawn from the posterior of the coefficients.
+    std::vector<RigidQuadratic> draws;
 };
 
 // strain  the standard deviation of the map's slopes that is expected beforehand; with it and the

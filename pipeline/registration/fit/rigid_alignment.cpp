@@ -22,6 +22,8 @@ namespace {
 // bodies after a rigid alignment: overlap as such is neither rewarded nor penalised.
 constexpr double kNoCounterpartMm = 12;
 constexpr double kScoreScaleMm = 10;
+// Poses nearer to each other are one.
+constexpr double kSamePoseRad = 20 * kPi / 180, kSamePoseMm = 40;
 
 // The points of both surfaces that are matched; the skin that is searched may hold more points.
 struct Pair {
@@ -268,7 +270,7 @@ std::vector<RigidCandidate> distinct(std::vector<RigidCandidate> all, int max_co
     for (const RigidCandidate& c : all) {
         if (static_cast<int>(chosen.size()) >= max_count) break;
         const bool seen = std::any_of(chosen.begin(), chosen.end(), [&](const RigidCandidate& o) {
-            return same_pose(o.target_from_skin, c.target_from_skin, 20 * kPi / 180, 40);
+            return same_pose(o.target_from_skin, c.target_from_skin, kSamePoseRad, kSamePoseMm);
         });
         if (!seen) chosen.push_back(c);
     }
@@ -302,12 +304,20 @@ std::vector<RigidCandidate> align_rigid_candidates(const SkinModel& skin,
         }
     });
     report_progress(progress, 0.5, "rigid alignment: refining the best starts");
-    std::vector<RigidCandidate> best = distinct(std::move(found), std::max(options.kept, 1));
+    std::vector<RigidCandidate> best = distinct(found, std::max(options.kept, 1));
+    for (RigidCandidate& c : best) {
+        c.found = static_cast<int>(
+            std::count_if(found.begin(), found.end(), [&](const RigidCandidate& o) {
+                return same_pose(o.target_from_skin, c.target_from_skin, kSamePoseRad, kSamePoseMm);
+            }));
+    }
     const Pair fine = make_pair_of(skin, target, options.fine_points);
     parallel_for(best.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t n = begin; n < end; ++n) {
+            const int times = best[n].found;
             best[n] = descend(fine, options.hints, best[n].target_from_skin,
                               options.fine_iterations, 12, 6);
+            best[n].found = times;
         }
     });
     if (options.hints.up) {

@@ -58,6 +58,7 @@ struct RigidCandidate {
     Rigid target_from_skin;  // between the frames relative to their origins
     double score_mm = 0;     // root of the mean penalty over both surfaces
     double coverage = 0;     // share of readings with a counterpart
+    int found = 0;           // starts that ended near it; 0: it comes from elsewhere
 };
 
 // Distinct candidates (more than 20 degrees or 40 mm apart), best score first; never empty.

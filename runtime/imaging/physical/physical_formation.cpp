@@ -9,6 +9,7 @@
 
 #include "runtime/imaging/core/host.h"
 #include "runtime/imaging/physical/fast/physical_fast.h"
+#include "runtime/imaging/physical/model/opening_gain.h"
 #include "runtime/imaging/physical/model/read_ahead.h"
 #include "runtime/imaging/physical/reference/physical_reference.h"
 
@@ -65,6 +66,10 @@ class PhysicalFormation final : public ImageFormation {
         machine.looks.count = share(machine.looks.count);
         machine.looks.near_count = share(machine.looks.near_count);
         level.tables = physical::make_tables(exercise_.probe, machine, geometry);
+        const physical::OpeningGain opening =
+            physical::opening_gain(scene_, exercise_, level.tables, geometry);
+        for (physical::Row& row : level.tables.rows)
+            row.unit_db += opening.at(row.r_mm / geometry.depth_mm);
         if (reference_) return;
         level.fast = std::make_unique<PhysicalFast>(scene_, geometry, level.tables, noise_,
                                                     press::press_face(exercise_.probe), context_);
@@ -175,7 +180,7 @@ double needle_slab_mm(const Exercise& exercise) {
 }
 
 int scanlines(const Exercise& exercise, const RenderOptions& options) {
-    return chosen_machine(exercise, options).beam.lines;
+    return physical::beams_across(exercise.probe, chosen_machine(exercise, options));
 }
 
 int samples(const Exercise& exercise, const RenderOptions& options) {

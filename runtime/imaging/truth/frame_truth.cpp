@@ -51,6 +51,7 @@ struct TruthRenderer::Impl {
     TruthPixels pixels;
     PlaneLookUp look_up;
     CaseAnatomy anatomy;
+    NeedleSight sight;
     NeedleModel needle;
     TruthVoxels voxels;
     std::unique_ptr<press::ProbePress> probe;  // null: effect deformation is off
@@ -96,6 +97,7 @@ TruthRenderer::Impl::Impl(CaseView view,
       look_up(
           view, exercise, moves.contact, moves.breathing, moves.pulsation, geometry, pixels.rays()),
       anatomy(view, moves.breathing ? e.breathing : BreathingMotion{}),
+      sight(&anatomy, e),
       needle(e.needle),
       voxels(*view, o.model == ImageModel::physical),
       first_hard_mm(pixels.rays()) {
@@ -341,7 +343,8 @@ void TruthRenderer::Impl::needle_facts(const FrameInput& input) {
     NeedleShape shape;
     truth.has_needle = needle_shape_of(input, shape);
     truth.tip_in_plane = false;
-    truth.needle_in_image_mm = 0;
+    truth.tip_visible = false;
+    truth.needle_in_image_mm = truth.needle_visible_mm = 0;
     truth.tip_label = 0;
     if (!truth.has_needle) return;
     truth.needle = {input.needle.tip, normalized(input.needle.direction)};
@@ -353,6 +356,10 @@ void TruthRenderer::Impl::needle_facts(const FrameInput& input) {
     }
     truth.tip_probe = shape.tip;
     const double half_slab = 0.5 * shape.slab_mm;
+    const Rigid& pose = input.mannequin_from_probe;
+    truth.tip_visible = sight.tip_visible(pose, shape.tip, shape.axis, truth.time_s);
+    truth.needle_visible_mm =
+        sight.visible_mm(pose, shape.tip, shape.tip - shape.length_mm * shape.axis, truth.time_s);
     truth.tip_in_plane =
         std::abs(shape.tip.y) <= half_slab && in_image(exercise.probe, shape.tip.x, shape.tip.z);
     truth.needle_in_image_mm = length_in_image(

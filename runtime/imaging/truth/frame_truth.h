@@ -61,7 +61,10 @@ struct FrameTruth {
     NeedlePose needle;          // as drawn; its dent is 0 without effect deformation
     Point3 tip_probe;           // frame `probe`: y is the distance to the scan plane
     bool tip_in_plane = false;  // inside the slab that the needle shows in, and the scanned area
-    double needle_in_image_mm = 0;     // length of the shaft that the slab shows
+    double needle_in_image_mm = 0;  // length of the shaft that lies in the slab and the image
+    // What shows of them, by formats/scoring/sight.h: as the scores count it.
+    bool tip_visible = false;
+    double needle_visible_mm = 0;
     int tip_label = 0;                 // tissue that the tip is in; 0: outside the body
     std::vector<TargetTruth> targets;  // one per target of the exercise
     int nearest_target = -1;           // nearest to the tip; -1: no needle or no target

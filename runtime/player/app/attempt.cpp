@@ -3,6 +3,7 @@
 #include "runtime/player/app/attempt.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 
 #include "runtime/player/app/settings.h"
@@ -10,6 +11,21 @@
 #include "runtime/recording/session_words.h"
 
 namespace sonocase::runtime::inline player_app {
+UnkeptRecording::UnkeptRecording() {
+    std::error_code failed;
+    const std::filesystem::path all = std::filesystem::temp_directory_path(failed);
+    if (failed) return;
+    std::string name = (all / "sonoplay-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) return;
+    folder_ = name;
+    path_ = folder_ + "/attempt.igs.mha";
+}
+
+UnkeptRecording::~UnkeptRecording() {
+    std::error_code ignored;
+    if (!folder_.empty()) std::filesystem::remove_all(folder_, ignored);
+}
+
 std::string new_session_path(const std::string& case_name, const std::string& exercise) {
     if (data_folder().empty()) return {};
     const std::string folder = data_folder() + "/sessions";

@@ -55,6 +55,20 @@ class Attempt {
     AttemptView view_;
 };
 
+// A recording for which there is no folder of the user's: it lies among the system's temporary
+// files and goes with this object.
+class UnkeptRecording {
+  public:
+    UnkeptRecording();
+    ~UnkeptRecording();
+    UnkeptRecording(const UnkeptRecording&) = delete;
+    UnkeptRecording& operator=(const UnkeptRecording&) = delete;
+    const std::string& path() const { return path_; }  // empty: there is no such place either
+
+  private:
+    std::string folder_, path_;
+};
+
 // A new file in the user's sessions folder; empty if there is no such folder.
 std::string new_session_path(const std::string& case_name, const std::string& exercise);
 

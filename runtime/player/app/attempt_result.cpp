@@ -54,6 +54,25 @@ double metric_of(const ProgressEntry& entry, const std::string& name) {
     return NAN;
 }
 
+constexpr const char* kFindTarget =
+    "Find the target first: slide and tilt the probe until it lies in the middle of the picture.";
+constexpr const char* kTakeNeedle =
+    "Take the needle: put it beside the probe, in the plane of the picture, and aim at the target.";
+
+// What went wrong before any mark could say it: no needle was used, or the target was not found.
+// Null: neither.
+const char* earlier_fault(const SessionScore& score) {
+    constexpr double kFarMm = 20, kFarLimits = 3;
+    for (const PassResult& mark : score.pass_marks) {
+        if (mark.metric != "final_tip_to_target_mm" || mark.passed) continue;
+        const double mm = mark.value;
+        const bool found = score.value("targets_scanned_percent") > 0;
+        if (!std::isfinite(mm)) return found ? kTakeNeedle : kFindTarget;
+        if (mm > std::max(kFarMm, kFarLimits * mark.at_most)) return kFindTarget;
+    }
+    return nullptr;
+}
+
 }  // namespace
 
 AttemptResult attempt_result(const SessionScore& score, std::span<const ProgressEntry> earlier) {
@@ -72,6 +91,7 @@ AttemptResult attempt_result(const SessionScore& score, std::span<const Progress
         result.trend_metric = result.rows.front().metric;
         const MetricInfo* info = find_metric(result.trend_metric);
         if (!result.passed && info) result.advice = info->advice;
+        if (const char* fault = earlier_fault(score)) result.advice = fault;
     }
     for (const Metric& metric : score.metrics) {
         if (result.rows.size() >= kMaxResults) break;

@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include "formats/scoring/draw_attempt.h"
+#include "formats/scoring/sight.h"
 #include "runtime/player/app/case_steps.h"
 #include "runtime/player/app/next_exercise.h"
 #include "runtime/player/app/tracker_steps.h"
@@ -137,9 +138,17 @@ void start_attempt(
     const std::string name = loaded.exercise().name;
     std::string file = path;
     if (file.empty()) file = new_session_path(loaded.open->bundle->manifest.case_name, name);
+    std::shared_ptr<UnkeptRecording> unkept;
     if (file.empty()) {
-        player.notices.error("There is no folder to record to: set HOME or XDG_DATA_HOME.");
-        return;
+        unkept = std::make_shared<UnkeptRecording>();
+        file = unkept->path();
+        if (file.empty()) {
+            player.notices.error("There is no folder to record to: set HOME or XDG_DATA_HOME.");
+            return;
+        }
+        player.notices.warning(
+            "This attempt is scored but not kept: set HOME or XDG_DATA_HOME to a folder that can "
+            "be written.");
     }
     draw_new_attempt(player, loaded, scan, exam);
     const Exercise& exercise = loaded.exercise();
@@ -158,6 +167,9 @@ void start_attempt(
     training.attempt = std::make_shared<Attempt>(*loaded.open, exercise, std::move(*run), started);
     training.score.reset();
     training.result.reset();
+    training.unkept = std::move(unkept);
+    training.steps_done = {};
+    training.leave_asked_s = -1e9;
     std::vector<bool>& reached = training.targets_reached;
     reached.assign(reached.size(), false);
     observe_frames(training.attempt, scan.servers, *loaded.scan);
@@ -180,12 +192,33 @@ void finish_attempt(PlayerState& player, CaseState& loaded, ScanState& scan) {
     set_frozen(scan.console, false);
 }
 
+namespace {
+
+// True if the user was asked this in the last 4 s and insists by the same key. Else asks.
+bool confirmed(PlayerState& player,
+               Training& training,
+               const std::string& key,
+               const Message& question) {
+    constexpr double kAskedForS = 4;
+    if (player.now_s - training.leave_asked_s < kAskedForS && training.leave_asked == key)
+        return true;
+    training.leave_asked_s = player.now_s;
+    training.leave_asked = key;
+    player.notices.warning(question);
+    return false;
+}
+
+}  // namespace
+
 bool toggle_attempt(PlayerState& player, CaseState& loaded, ScanState& scan) {
     const Training& training = scan.training;
     if (!training.attempt) {
         start_attempt(player, loaded, scan, "", training.exam && training.score.has_value());
         return false;
     }
+    if (training.exam && !confirmed(player, scan.training, "B",
+                                    "This is an exam: B again ends it and scores it, as it is."))
+        return false;
     finish_attempt(player, loaded, scan);
     return training.result.has_value();
 }
@@ -232,16 +265,14 @@ void open_review(Notices& notices, const CaseState& loaded, const Training& trai
 }
 
 bool may_leave_attempt(PlayerState& player, Training& training, const std::string& key) {
-    constexpr double kAskedForS = 4;
-    const bool asked =
-        player.now_s - training.leave_asked_s < kAskedForS && training.leave_asked == key;
-    if (!training.attempt || asked) return true;
-    training.leave_asked_s = player.now_s;
-    training.leave_asked = key;
-    player.notices.warning(
-        {"An attempt is running. {} again ends it as it is; B finishes it and shows the result.",
-         {key}});
-    return false;
+    if (!training.attempt) return true;
+    return confirmed(
+        player, training, key,
+        training.exam
+            ? Message("Leave the exam? {} again ends it as it is, and it counts.", {key})
+            : Message("An attempt is running. {} again ends it as it is; B finishes it and shows "
+                      "the result.",
+                      {key}));
 }
 
 void show_next_hint(Notices& notices, const CaseState& loaded, Training& training) {
@@ -260,6 +291,34 @@ bool shows_targets(const ScanState& scan, const Exercise& exercise) {
         return !(scan.training.exam && scan.training.score && !scan.replay.runs());
     return exercise.mode == ExerciseMode::practice &&
            scan.training.hints_shown > static_cast<int>(exercise.hints.size());
+}
+
+void note_steps(const Exercise& exercise,
+                const Anatomy* anatomy,
+                const FrameRecord& record,
+                std::span<const Point3> centres,
+                StepsDone& done) {
+    constexpr double kPlaneMm = 5, kShaftMm = 5, kNearMm = 15;
+    if (!record.tools.has_probe || done.tip_near) return;
+    const Rigid& pose = record.tools.mannequin_from_probe;
+    const Rigid probe_from = inverse(pose);
+    const double now_s = record.input.time_s;
+    for (const Point3& centre : centres) {
+        const Point3 p = probe_from * centre;
+        if (!done.target_seen && std::abs(p.y) < kPlaneMm && in_image(exercise.probe, p.x, p.z))
+            done.target_seen = !anatomy || sound_reaches(*anatomy, exercise.probe, pose, p, now_s);
+    }
+    if (!done.target_seen || !record.tools.has_needle || !(record.needle.depth_mm > 0)) return;
+    const NeedleSight sight(anatomy, exercise);
+    const Point3 drawn = record.needle.mannequin_from_drawn * Point3{0, 0, 0};
+    const Point3 tip = probe_from * drawn;
+    const Vector3 axis = probe_from * record.needle.mannequin_from_drawn.rotation.column(2);
+    if (!done.needle_seen)
+        done.needle_seen =
+            sight.visible_mm(pose, tip, tip - record.needle.depth_mm * axis, now_s) >= kShaftMm;
+    if (!done.needle_seen || !sight.tip_visible(pose, tip, axis, now_s)) return;
+    for (const Point3& centre : centres)
+        done.tip_near = done.tip_near || distance(drawn, centre) < kNearMm;
 }
 
 void mark_targets_reached(const Exercise& exercise,

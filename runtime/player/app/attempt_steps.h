@@ -18,7 +18,8 @@ void step_cine(Console& console, int frames, int kept);
 // Once per picture: the next frame of a cine loop that plays.
 void advance_cine(Console& console, int kept, double now_s);
 
-// path: of the recording; empty: a new file in the user's sessions folder. exam: gives no help even
+// path: of the recording; empty: a new file in the user's sessions folder or, where there is none,
+// one that is not kept, which a notice says. exam: gives no help even
 // where the exercise would. Does nothing while an attempt runs or no case is open.
 void start_attempt(PlayerState& player,
                    CaseState& loaded,
@@ -27,7 +28,8 @@ void start_attempt(PlayerState& player,
                    bool exam = false);
 // Ends the recording and scores it. Does nothing unless an attempt runs.
 void finish_attempt(PlayerState& player, CaseState& loaded, ScanState& scan);
-// Starts or finishes an attempt. Returns whether there is a result to show.
+// Starts or finishes an attempt; asks, in a notice, before it ends an exam. Returns whether there
+// is a result to show.
 bool toggle_attempt(PlayerState& player, CaseState& loaded, ScanState& scan);
 // True if nothing would be lost by leaving: no attempt runs, or the user was asked in the last 4 s
 // and insists by the same key. Else asks, in a notice. key: that was pressed, as in "F5".
@@ -49,6 +51,15 @@ bool shows_targets(const ScanState& scan, const Exercise& exercise);
 void observe_frames(const std::shared_ptr<Attempt>& attempt,
                     const Servers& servers,
                     ScanThread& thread);
+
+// Notes which steps of an attempt this frame shows done.
+// anatomy         as the picture breathes; null: whatever lies in the sector shows
+// record, centres as for mark_targets_reached()
+void note_steps(const Exercise& exercise,
+                const Anatomy* anatomy,
+                const FrameRecord& record,
+                std::span<const Point3> centres,
+                StepsDone& done);
 
 // Marks the targets that the drawn needle's tip has reached.
 // record          the frame shown

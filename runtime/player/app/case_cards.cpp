@@ -92,12 +92,25 @@ namespace {
 
 constexpr int kWidthPx = 416, kHeightPx = 260;
 
-// The same file as before, as far as size and time of change say.
+// The same file and the same exercises beside it as before, as far as sizes and times of change
+// say.
 std::string state_of(const std::string& path) {
     std::error_code failed;
-    const auto size = std::filesystem::file_size(path, failed);
-    const auto time = std::filesystem::last_write_time(path, failed);
-    return std::to_string(size) + "/" + std::to_string(time.time_since_epoch().count());
+    std::vector<std::string> states;
+    const auto add = [&](const std::filesystem::path& file) {
+        const auto size = std::filesystem::file_size(file, failed);
+        const auto time = std::filesystem::last_write_time(file, failed);
+        states.push_back(file.filename().string() + "/" + std::to_string(size) + "/" +
+                         std::to_string(time.time_since_epoch().count()));
+    };
+    add(path);
+    for (std::filesystem::directory_iterator it(path + ".exercises", failed), end;
+         !failed && it != end; it.increment(failed))
+        add(it->path());
+    std::sort(states.begin(), states.end());  // folders list in any order
+    std::string state;
+    for (const std::string& one : states) state += one + " ";
+    return state;
 }
 
 void draw_picture(const OpenCase& open, CaseCard& card) {

@@ -229,6 +229,8 @@ void choose_preset(PlayerState& player,
                    const ImagePreset& preset) {
     loaded.engine.image.depth_mm = preset.depth_mm;
     loaded.engine.image.focus_mm = preset.focus_mm;
+    console.controls.settings.gain_db = 0;  // at which an exercise opens, with even depth gain
+    console.controls.settings.tgc_db = {};
     rebuild_engine(player, loaded, console);
 }
 
@@ -242,7 +244,7 @@ void adjust_gain(const ScanFrame& frame, ImageSettings& image) {
         if (depth < 0 || row > 7) continue;
         for (int x = frame.width_px / 3; x < 2 * frame.width_px / 3; ++x) {
             const int level = frame.pixels[static_cast<std::size_t>(y) * frame.width_px + x];
-            if (level < 6) continue;
+            if (level < 30) continue;  // fluid, shadow and what a machine shows of no echo
             sum[row] += level;
             count[row] += 1;
         }

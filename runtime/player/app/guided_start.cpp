@@ -24,10 +24,13 @@ void GuidedStart::skip() {
 }
 
 bool GuidedStart::observe(const GuideSight& sight) {
-    if (sight.has_probe && !begun_) {
+    const Vector3 step = sight.mannequin_from_probe.translation - last_.translation;
+    // A jump is no movement of the hand: another exercise began somewhere else.
+    if (sight.has_probe && (!begun_ || norm(step) >= kSlideMm)) {
         start_ = sight.mannequin_from_probe;
         begun_ = true;
     }
+    if (sight.has_probe) last_ = sight.mannequin_from_probe;
     bool done = false;
     switch (step_) {
         case GuideStep::slide: {

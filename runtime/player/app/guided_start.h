@@ -32,7 +32,7 @@ class GuidedStart {
 
     GuideStep step_ = GuideStep::slide;
     bool begun_ = false;  // `start_` is set
-    Rigid start_;
+    Rigid start_, last_;  // last_: of the observation before
     bool was_frozen_ = false;
 };
 

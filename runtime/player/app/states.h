@@ -153,15 +153,23 @@ struct ExamSet {
     bool runs() const { return !exercises.empty(); }
 };
 
+// What was done in an attempt: the target seen in the plane, the needle seen in it, and the tip
+// brought near the target while it showed. Each once; none is undone.
+struct StepsDone {
+    bool target_seen = false, needle_seen = false, tip_near = false;
+};
+
 struct Training {
     std::shared_ptr<Attempt> attempt;   // running; shared with the scan thread
     bool exam = false;                  // the attempt that runs or ran last gives no help
     int hints_shown = 0;                // of the exercise's in this attempt; one more: the targets
     std::vector<bool> targets_reached;  // # targets; in free scanning or in the attempt
+    StepsDone steps_done;               // of the attempt
     std::optional<SessionScore> score;  // of the last attempt
     std::string score_file;             // the recording of that attempt
-    std::optional<AttemptResult> result;  // of `score`, for the page after the attempt
-    std::optional<GuidedStart> guide;     // runs
+    std::shared_ptr<UnkeptRecording> unkept;  // `score_file` is one; null: it is kept
+    std::optional<AttemptResult> result;      // of `score`, for the page after the attempt
+    std::optional<GuidedStart> guide;         // runs
     ExamSet exam_set;
     double leave_asked_s = -1e9;  // when the user was asked whether to end the attempt ...
     std::string leave_asked;      // ... and by which key

@@ -34,7 +34,7 @@ void choose_tracker(PlayerState& player,
     }
     Result<std::unique_ptr<Tracker>> made =
         make_case_tracker(spec, *loaded.skin, loaded.exercise(), loaded.set_up.calibrations,
-                          session_clock(player.clock_start_s));
+                          player.arguments.tools, session_clock(player.clock_start_s));
     if (!made) {
         player.notices.error(made.error().message());
         choose_tracker(player, loaded, tracker, "mouse");

@@ -260,6 +260,10 @@ class HeadlessRun {
     // The pose of frame i, handed to the engine; now_s: when the frame is rendered.
     Status take_pose(int i, double& now_s);
     Status wait_for_reading();
+    // Prints what the tracker has to say, once per sentence.
+    void say_health();
+    // What a device did not give in all those frames.
+    Status report_lost();
     Status render(int i, double now_s);
 
     const PlayerArguments& arguments_;
@@ -281,6 +285,12 @@ class HeadlessRun {
     std::vector<std::uint8_t> pixels_;
     ImageSettings settings_;
     TrackerReading reading_;
+    std::string said_;  // format of the tracker's last sentence
+    struct LostFrames {
+        int frames = 0, seen = 0;  // lost since it was seen first; seen
+        double seconds = 0;
+    } probe_lost_, needle_lost_;
+    double last_frame_s_ = 0;
 
     std::unique_ptr<FrameFiles> files_;    // --out
     std::unique_ptr<TruthFiles> truth_;    // --truth
@@ -341,8 +351,9 @@ Status HeadlessRun::set_up_tracker() {
     clock_ = session_clock(steady_seconds());
     spec_ = arguments_.tracker;
     if (spec_.empty()) spec_ = exercise_->sweeps.empty() ? "null" : "sweep";
-    SONOCASE_TRY(std::unique_ptr<Tracker> made,
-                 make_case_tracker(spec_, *skin_, *exercise_, calibrations_, clock_));
+    SONOCASE_TRY(
+        std::unique_ptr<Tracker> made,
+        make_case_tracker(spec_, *skin_, *exercise_, calibrations_, arguments_.tools, clock_));
     tracker_ = std::move(made);
     tracker_->set_wake([this] { reading_arrived_.notify(); });
     frames_ = frame_count(arguments_, *tracker_);
@@ -387,9 +398,45 @@ Status HeadlessRun::wait_for_reading() {
             return Error{health.message.empty() ? "no reading came" : health.message,
                          "tracker " + spec_, "check the device, or use --tracker mouse"};
         }
+        say_health();
         reading_arrived_.wait(0.05);
     }
     return Done{};
+}
+
+void HeadlessRun::say_health() {
+    if (!tracker_->is_device() && tracker_->recorded_readings() == 0) return;
+    const TrackerHealth health = tracker_->health();
+    // A search ends of itself, or with an error.
+    if (health.phase == TrackerPhase::searching || health.message.empty() ||
+        health.message.format() == said_)
+        return;
+    const bool first = said_.empty() && health.phase == TrackerPhase::starting;
+    said_ = health.message.format();
+    if (!first) warn(health.message);
+}
+
+Status HeadlessRun::report_lost() {
+    const auto say = [&](const char* tool, const LostFrames& lost) {
+        if (lost.frames == 0) return;
+        char text[200];
+        std::snprintf(text, sizeof text,
+                      "The %s was out of view in %d of %d frames, %.2f s; they count as untracked.",
+                      tool, lost.frames, lost.frames + lost.seen, lost.seconds);
+        warn(text);
+    };
+    say("probe", probe_lost_);
+    say("needle", needle_lost_);
+    if (probe_lost_.seen > 0) return Done{};
+    // A run may be over before the tracker has heard enough to say why.
+    constexpr double kExplained = 2.5;
+    TrackerHealth health = tracker_->health();
+    for (const double end_s = clock_() + kExplained; health.message.empty() && clock_() < end_s;
+         health = tracker_->health())
+        reading_arrived_.wait(0.05);
+    return Error{
+        "no frame has a pose of the probe", "tracker " + spec_,
+        health.message.empty() ? Message("send one, such as ProbeToTracker") : health.message};
 }
 
 Status HeadlessRun::take_pose(int i, double& now_s) {
@@ -402,6 +449,7 @@ Status HeadlessRun::take_pose(int i, double& now_s) {
         now_s = frame_time_s(*tracker_, i, frames_);
         fresh = tracker_->poll(now_s, reading_);
     }
+    say_health();
     if (fresh) engine_->observe(reading_, device);
     if (i == 0 && device) {
         for (const std::string& warning :
@@ -433,7 +481,19 @@ Status HeadlessRun::render(int i, double now_s) {
     stats_.add((after_s - before_s) * 1e3, engine_->renderer().costs());
     stats_.count_unfitted(engine_->last().skin_not_fitted);
     stats_.set_press(engine_->renderer().press());
-    if (device) pose_to_pixel_.add((clock_() - reading_.time_s) * 1e3);
+    if (device) {
+        pose_to_pixel_.add((clock_() - reading_.time_s) * 1e3);
+        const ToolPoses& tools = engine_->last().tools;
+        const auto count = [&](LostFrames& lost, bool has) {
+            if (has) ++lost.seen;
+            if (has || lost.seen == 0) return;
+            ++lost.frames;
+            lost.seconds += now_s - last_frame_s_;
+        };
+        count(probe_lost_, tools.has_probe);
+        count(needle_lost_, tools.has_needle);
+        last_frame_s_ = now_s;
+    }
     if (doppler_) doppler_->frame(*engine_, pixels_);
     if (session_) {
         FrameRecord record = engine_->last();
@@ -495,9 +555,19 @@ Status HeadlessRun::finish() {
     if (doppler_ && !arguments_.sound.empty()) {
         if (Status written = doppler_->write_sound(arguments_.sound); !written) return written;
     }
-    if (arguments_.stats.empty()) return Done{};
-    const std::string doppler = doppler_ ? doppler_->json() : std::string();
-    return write_text_output(arguments_.stats, stats_.json(metrics, &pose_to_pixel_, doppler));
+    if (tracker_->is_device()) {
+        if (Status seen = report_lost(); !seen) return seen;
+    }
+    if (!arguments_.stats.empty()) {
+        const std::string doppler = doppler_ ? doppler_->json() : std::string();
+        if (Status written =
+                write_text_output(arguments_.stats, stats_.json(metrics, &pose_to_pixel_, doppler));
+            !written)
+            return written;
+    }
+    if (session_ && !session_->not_kept().empty())
+        return Error{session_->not_kept(), "", "close the program that has it, or free the folder"};
+    return Done{};
 }
 
 }  // namespace

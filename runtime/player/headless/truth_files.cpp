@@ -95,7 +95,9 @@ std::string truth_json(const FrameTruth& truth,
                        {"in_plane", truth.tip_in_plane},
                        {"label", tip},
                        {"name", labels[tip].name},
+                       {"visible", truth.tip_visible},
                        {"shaft_in_image_mm", truth.needle_in_image_mm},
+                       {"shaft_visible_mm", truth.needle_visible_mm},
                        {"dent_mm", {truth.needle.tent_mm, truth.needle.drag_mm}}};
     }
     line["visible"] = organs_json(truth, labels);

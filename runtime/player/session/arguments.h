@@ -40,6 +40,7 @@ struct PlayerArguments {
     int looks = 0;                          // 0: the machine's
     double frame_budget_ms = 15;            // window: time per frame; 0: full accuracy always
     std::vector<std::string> calibrations;  // files
+    std::vector<std::string> tools;         // "needle=StylusTipToTracker": names in a stream
     std::string serve;                      // [ADDRESS:]PORT of the OpenIGTLink server; empty: none
     std::string serve_poses;  // [ADDRESS:]PORT of the pose server for pages; empty: none
     bool instructor = false;  // window: a second one for the instructor

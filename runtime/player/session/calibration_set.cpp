@@ -2,6 +2,7 @@
 
 #include "runtime/player/session/calibration_set.h"
 
+#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -27,6 +28,11 @@ Result<Calibrations> load_calibrations(const std::vector<std::string>& files) {
         if (!place) {
             return Error{"kind is \"" + calibration.kind + "\"", file,
                          "expected probe, needle or mannequin; make one with sonocase calibrate"};
+        }
+        const Vector3& sigma = calibration.sigma_mm;
+        if (!std::isfinite(sigma.x) || !std::isfinite(sigma.y) || !std::isfinite(sigma.z)) {
+            return Error{"the " + calibration.kind + " is not determined by it", file,
+                         "calibrate again; for a needle a pivot of the tip and a spin are enough"};
         }
         if (*place) {
             return Error{"second calibration of the " + calibration.kind, file,

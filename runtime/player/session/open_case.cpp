@@ -153,8 +153,11 @@ Result<std::unique_ptr<Tracker>> make_case_tracker(const std::string& spec,
                                                    const Skin& skin,
                                                    const Exercise& exercise,
                                                    const Calibrations& calibrations,
+                                                   const std::vector<std::string>& tools,
                                                    const SessionClock& clock) {
     TrackerContext context;
+    SONOCASE_TRY(ToolNames names, parse_tool_names(tools));
+    context.tools = std::move(names);
     context.skin = &skin;
     context.exercise = &exercise;
     context.clock = clock;

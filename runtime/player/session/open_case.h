@@ -71,11 +71,13 @@ Result<ScanEngine> make_engine(const OpenCase& open,
 
 // The tracker of a --tracker specification; scripts and recordings start over when they end.
 // skin, exercise  of the case; the case must outlive the tracker
-// Errors: those of make_tracker.
+// tools           "needle=StylusTipToTracker": the names of tools in a stream
+// Errors: those of make_tracker and parse_tool_names.
 Result<std::unique_ptr<Tracker>> make_case_tracker(const std::string& spec,
                                                    const Skin& skin,
                                                    const Exercise& exercise,
                                                    const Calibrations& calibrations,
+                                                   const std::vector<std::string>& tools,
                                                    const SessionClock& clock);
 
 }  // namespace sonocase::runtime::inline player_session

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "formats/files/atomic_file.h"
 #include "formats/files/load_save.h"
 #include "formats/files/thread_jobs.h"
 #include "formats/progress_book/progress_book.h"
@@ -144,8 +145,14 @@ Result<SessionScore> SessionRun::finish() {
         if (book)
             kept = book->add(progress_entry(session.header, score, failed ? path_ : recording));
         if (!book || !kept) {
-            score.warnings.push_back("The session was not put into the progress book: " +
-                                     (book ? kept.error() : book.error()).message() + ".");
+            const std::string beside = path_ + ".scores.json";
+            const Status written = write_file(beside, score_json(score, exercise_));
+            not_kept_ = Message("The session was not put into the progress book: {}. {}",
+                                {(book ? kept.error() : book.error()).message(),
+                                 written ? Message("Its scores are in {}.", {beside})
+                                         : Message("Its scores were not kept either: {}.",
+                                                   {written.error().message()})});
+            score.warnings.push_back(not_kept_);
         }
     }
     return score;

@@ -66,6 +66,9 @@ class SessionRun {
     // Ends the recording, scores it and, if the trainee gave a name, adds it to the progress book
     // of this machine. The recording is complete even if scoring fails.
     Result<SessionScore> finish();
+    // Why finish() could not put the scores into the book, and where they are instead; empty: it
+    // could, or there was no trainee.
+    const Message& not_kept() const { return not_kept_; }
 
   private:
     SessionRun(const OpenCase& open, const ScanEngine& engine, std::string path);
@@ -81,6 +84,7 @@ class SessionRun {
     ImageSettings settings_;
     bool first_ = true;
     FrameRecord last_;
+    Message not_kept_;
 };
 
 }  // namespace sonocase::runtime::inline player_session

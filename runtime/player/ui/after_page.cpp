@@ -28,10 +28,15 @@ std::string needed_words(const ResultRow& row) {
 
 void draw_result(Ui& ui, const Box& box, const ResultRow& row) {
     Box room = box;
-    const unsigned packed = !row.has_limit ? colour::kDim
-                            : row.reached  ? colour::kGood
-                                           : colour::kBad;
-    const Icon icon = !row.has_limit ? Icon::timer : row.reached ? Icon::pass : Icon::fail;
+    // What was not measured has neither a verdict of its own nor a place on the scale.
+    const bool measured = std::isfinite(row.value);
+    const unsigned packed = !row.has_limit || !measured ? colour::kDim
+                            : row.reached               ? colour::kGood
+                                                        : colour::kBad;
+    const Icon icon = !measured        ? Icon::minus
+                      : !row.has_limit ? Icon::timer
+                      : row.reached    ? Icon::pass
+                                       : Icon::fail;
     const Box mark = room.take_left(36);
     ui.icon(icon, mark.x, mark.y + 0.5f * mark.h - 12, 24, packed);
     const bool scale = room.w > 560;
@@ -54,6 +59,7 @@ void draw_result(Ui& ui, const Box& box, const ResultRow& row) {
         const float x = line.x + row.limit_at * line.w;
         ui.fill({x - 1, middle - 12, 2, 24}, colour::kText);
     }
+    if (!measured) return;
     const float x = line.x + row.value_at * line.w;
     if (!row.has_limit || row.reached) {
         ui.disc(x, middle, 6, packed);

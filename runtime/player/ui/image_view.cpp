@@ -8,10 +8,12 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 
 #include "runtime/display/image_texture.h"
 #include "runtime/display/theme.h"
 #include "runtime/player/ui/doppler_marks.h"
+#include "runtime/player/ui/parts/panel_parts.h"
 #include "runtime/player/words/words.h"
 
 namespace sonocase::runtime::inline player_ui {
@@ -100,11 +102,18 @@ void draw_grey_bar(const Box& area, float s) {
 void draw_status(const ImagePlace& place, const ScanFrame& frame) {
     const bool no_contact = frame.status == FrameStatus::no_contact;
     const bool held = frame.status == FrameStatus::held_bad_pose;
-    const bool nothing = frame.waiting || no_contact || held;
-    if (!nothing && !frame.record.skin_not_fitted) return;
+    const auto out_of_view = [](SensorVerdict verdict) {
+        return verdict == SensorVerdict::lost || verdict == SensorVerdict::stale;
+    };
+    const bool no_probe = !frame.frozen && out_of_view(frame.probe_verdict);
+    const bool no_needle = !frame.frozen && out_of_view(frame.needle_verdict);
+    const bool nothing = frame.waiting || no_probe || no_contact || held;
+    if (!nothing && !no_needle && !frame.record.skin_not_fitted) return;
     const char* words = frame.waiting ? tr("No reading from the tracker yet")
+                        : no_probe    ? tr("Probe out of view: picture held")
                         : no_contact  ? tr("No contact: press the probe onto the skin")
                         : held        ? tr("Pose is not usable: picture held")
+                        : no_needle   ? tr("Needle out of view")
                                       : tr("Not fitted here: the mannequin was not swept");
     const ImVec2 wide = ImGui::CalcTextSize(words);
     // Over a picture of tissue the words are at its bottom.
@@ -311,6 +320,23 @@ void draw_stopped(Ui& ui, const Box& area, const ImageViewInput& input) {
     ui.paragraph(room, all, Type::small, colour::kText, true);
 }
 
+void dotted_ring(ImDrawList* draw, ImVec2 centre, float radius, float s) {
+    const int dots = std::max(12, static_cast<int>(radius / (3 * s)));
+    for (int i = 0; i < dots; ++i) {
+        const double angle_rad = 2 * std::numbers::pi * i / dots;
+        draw->AddCircleFilled({centre.x + radius * static_cast<float>(std::cos(angle_rad)),
+                               centre.y + radius * static_cast<float>(std::sin(angle_rad))},
+                              1.4f * s, colour::kMeasure, 6);
+    }
+}
+
+void words_beside(ImDrawList* draw, ImVec2 centre, float radius, const std::string& words) {
+    const ImVec2 wide = ImGui::CalcTextSize(words.c_str());
+    const float x = centre.x - 0.5f * wide.x, y = centre.y - radius - wide.y - 2;
+    draw->AddText({x + 1, y + 1}, colour::rgba(0, 0, 0, 200), words.c_str());
+    draw->AddText({x, y}, colour::kMeasure, words.c_str());
+}
+
 }  // namespace
 
 PictureSize picture_size(const Box& area, float scale) {
@@ -324,6 +350,33 @@ PictureSize picture_size(const Box& area, float scale) {
 
 Box body_mark_box(const Box& area) {
     return {area.right() - kScaleRoom - 70, area.bottom() - 100, 60, 84};
+}
+
+void draw_target_marks(Ui& ui,
+                       const ImagePlace& place,
+                       const std::vector<TargetMark>& targets,
+                       bool flipped) {
+    ImDrawList* draw = ImGui::GetWindowDrawList();
+    const float s = ui.scale();
+    ImGui::PushFont(fonts().small);
+    for (const TargetMark& target : targets) {
+        if (!(target.centre.z > 0)) continue;  // behind the face
+        const double per_px = place.mm_per_screen_px, x = (flipped ? -1 : 1) * target.centre.x;
+        const ImVec2 at{static_cast<float>(place.origin_x + x / per_px),
+                        static_cast<float>(place.origin_y + target.centre.z / per_px)};
+        const double off = std::abs(target.centre.y), r = target.radius_mm;
+        if (off < r) {
+            const auto ring = static_cast<float>(std::sqrt(r * r - off * off) / per_px);
+            draw->AddCircle(at, ring, colour::rgba(0, 0, 0, 200), 0, 4 * s);
+            draw->AddCircle(at, ring, colour::kMeasure, 0, 2 * s);
+            words_beside(draw, at, ring, target.name);
+        } else {
+            const auto ring = static_cast<float>(r / per_px);
+            dotted_ring(draw, at, ring, s);
+            words_beside(draw, at, ring, target.name + text("  %.0f mm", off));
+        }
+    }
+    ImGui::PopFont();
 }
 
 ImagePlace draw_image_view(Ui& ui, const Box& area, const ImageViewInput& input) {

@@ -61,6 +61,18 @@ PictureSize picture_size(const Box& area, float scale);
 // The box of the body mark in the picture's area, u.
 Box body_mark_box(const Box& area);
 
+struct TargetMark {
+    Point3 centre;  // `probe` frame
+    double radius_mm = 0;
+    std::string name;
+};
+// A ring where the scan plane cuts a target; beside the plane a dotted ring of the target's size,
+// with the distance to the plane. flipped: left and right are exchanged.
+void draw_target_marks(Ui& ui,
+                       const ImagePlace& place,
+                       const std::vector<TargetMark>& targets,
+                       bool flipped);
+
 ImagePlace draw_image_view(Ui& ui, const Box& area, const ImageViewInput& input);
 
 }  // namespace sonocase::runtime::inline player_ui

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 #include <string>
 #include <vector>
 
@@ -28,59 +27,6 @@
 
 namespace sonocase::runtime::inline player_ui {
 namespace {
-
-struct TargetMark {
-    Point3 centre;  // `probe` frame
-    double radius_mm = 0;
-    bool reached = false;
-    std::string name;
-};
-
-void dotted_ring(ImDrawList* draw, ImVec2 centre, float radius, float s) {
-    const int dots = std::max(12, static_cast<int>(radius / (3 * s)));
-    for (int i = 0; i < dots; ++i) {
-        const double angle_rad = 2 * std::numbers::pi * i / dots;
-        draw->AddCircleFilled({centre.x + radius * static_cast<float>(std::cos(angle_rad)),
-                               centre.y + radius * static_cast<float>(std::sin(angle_rad))},
-                              1.4f * s, colour::kMeasure, 6);
-    }
-}
-
-void words_beside(ImDrawList* draw, ImVec2 centre, float radius, const std::string& words) {
-    const ImVec2 wide = ImGui::CalcTextSize(words.c_str());
-    const float x = centre.x - 0.5f * wide.x, y = centre.y - radius - wide.y - 2;
-    draw->AddText({x + 1, y + 1}, colour::rgba(0, 0, 0, 200), words.c_str());
-    draw->AddText({x, y}, colour::kMeasure, words.c_str());
-}
-
-// A ring where the scan plane cuts a target; beside the plane a dotted ring of the target's size,
-// with the distance to the plane. flipped: left and right are exchanged.
-void draw_target_marks(Ui& ui,
-                       const ImagePlace& place,
-                       const std::vector<TargetMark>& targets,
-                       bool flipped) {
-    ImDrawList* draw = ImGui::GetWindowDrawList();
-    const float s = ui.scale();
-    ImGui::PushFont(fonts().small);
-    for (const TargetMark& target : targets) {
-        if (!(target.centre.z > 0)) continue;  // behind the face
-        const double per_px = place.mm_per_screen_px, x = (flipped ? -1 : 1) * target.centre.x;
-        const ImVec2 at{static_cast<float>(place.origin_x + x / per_px),
-                        static_cast<float>(place.origin_y + target.centre.z / per_px)};
-        const double off = std::abs(target.centre.y), r = target.radius_mm;
-        if (off < r) {
-            const auto ring = static_cast<float>(std::sqrt(r * r - off * off) / per_px);
-            draw->AddCircle(at, ring, colour::rgba(0, 0, 0, 200), 0, 4 * s);
-            draw->AddCircle(at, ring, colour::kMeasure, 0, 2 * s);
-            words_beside(draw, at, ring, target.name);
-        } else {
-            const auto ring = static_cast<float>(r / per_px);
-            dotted_ring(draw, at, ring, s);
-            words_beside(draw, at, ring, target.name + text("  %.0f mm", off));
-        }
-    }
-    ImGui::PopFont();
-}
 
 constexpr float kRow = 26;
 
@@ -243,7 +189,6 @@ void draw_picture(const SessionView& session, const ViewState& view, Ui& ui, con
     const InstructorView& own = view.display.instructor;
     const ScanControls& controls = session.scan.console.controls;
     const ImageSettings& image = controls.settings;
-    const std::vector<bool>& reached = session.scan.training.targets_reached;
     const Measurements none;
     const bool begun = view.tools.measurements.begun().has_value();
     ImageViewInput input{frame, own.picture->empty() ? nullptr : own.picture->id(),
@@ -265,8 +210,8 @@ void draw_picture(const SessionView& session, const ViewState& view, Ui& ui, con
     std::vector<TargetMark> targets;
     for (std::size_t i = 0; i < centres.size(); ++i) {
         const Target& target = loaded.exercise().targets[i];
-        targets.push_back({probe_from_mannequin * centres[i], target.radius_mm,
-                           i < reached.size() && reached[i], tissue_words(target.name)});
+        targets.push_back(
+            {probe_from_mannequin * centres[i], target.radius_mm, tissue_words(target.name)});
     }
     ui.clip(area);
     draw_target_marks(ui, place, targets, input.flipped);

@@ -73,6 +73,13 @@ double axis(int negative, int positive) {
     return (down(positive) ? 1.0 : 0.0) - (down(negative) ? 1.0 : 0.0);
 }
 
+// A tap is a step of 1, however long its picture takes; held, the key goes on by 12 a second.
+double stepped(int key, double seconds) {
+    constexpr float kHeldS = 0.25f;
+    if (pressed(key)) return 1;
+    return down(key) && ImGui::GetIO().KeysDownDuration[key] > kHeldS ? 12 * seconds : 0;
+}
+
 void move_probe(MouseTracker& mouse, double seconds) {
     const ImGuiIO& io = ImGui::GetIO();
     const double slow = io.KeyAlt ? 0.25 : 1;
@@ -167,8 +174,10 @@ void change_console(
     choose_by_digit(requests);
     ImageSettings& image = console.controls.settings;
     // Together with Ctrl these keys change the size of the text.
-    const double gain = ImGui::GetIO().KeyCtrl ? 0 : axis(GLFW_KEY_MINUS, GLFW_KEY_EQUAL);
-    if (gain != 0) image.gain_db = std::clamp(image.gain_db + 12 * gain * seconds, -30.0, 30.0);
+    const double gain_db = ImGui::GetIO().KeyCtrl ? 0
+                                                  : stepped(GLFW_KEY_EQUAL, seconds) -
+                                                        stepped(GLFW_KEY_MINUS, seconds);
+    if (gain_db != 0) image.gain_db = std::clamp(image.gain_db + gain_db, -30.0, 30.0);
     if (change_tgc(image, seconds)) return;
     change_time(console, tracker, kept);
     if (pressed(GLFW_KEY_LEFT_BRACKET, true)) requests.push_back(request::ChangeDepth{-10});

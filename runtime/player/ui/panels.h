@@ -40,11 +40,13 @@ struct TaskCardInput {
     const FrameRecord& record;                 // of the frame shown
     std::span<const Point3> target_centres;    // # targets, `mannequin` frame
     const std::vector<bool>& targets_reached;  // # targets
+    StepsDone steps;                           // of the attempt
     const Attempt* attempt;                    // null: none runs
     int attempt_number;                        // of this trainee at this exercise, from 1
     const MouseTracker* mouse;                 // null: not in use
     const GuidedStart* guide;                  // null: does not run
     bool exam, replays;
+    bool flipped;        // left and right of the picture
     bool live;           // false: no reading, values are dashes
     bool shows_targets;  // false: neither distances nor places
     int hints_shown;

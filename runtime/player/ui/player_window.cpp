@@ -35,6 +35,9 @@ void PlayerWindow::follow_session() {
     Training& training = scan_.training;
     mark_targets_reached(loaded_.exercise(), record, loaded_.target_centres(),
                          training.targets_reached);
+    if (training.attempt)
+        note_steps(loaded_.exercise(), loaded_.engine.anatomy.get(), record,
+                   loaded_.target_centres(), training.steps_done);
     if (training.guide) {
         training.guide->observe({.has_probe = record.tools.has_probe,
                                  .mannequin_from_probe = record.tools.mannequin_from_probe,

@@ -211,12 +211,14 @@ void show_task(const SessionView& session,
                               .record = loaded.frame().record,
                               .target_centres = centres,
                               .targets_reached = training.targets_reached,
+                              .steps = training.steps_done,
                               .attempt = training.attempt.get(),
                               .attempt_number = attempt_number(session),
                               .mouse = scan.tracker.mouse.get(),
                               .guide = training.guide ? &*training.guide : nullptr,
                               .exam = training.in_exam(),
                               .replays = scan.replay.runs(),
+                              .flipped = scan.console.controls.settings.flip_left_right,
                               .live = session.live,
                               .shows_targets = shows_targets(scan, loaded.exercise()),
                               .hints_shown = training.hints_shown,
@@ -314,6 +316,18 @@ void pick_name(ViewState& view, const ImagePlace& place, Requests& requests) {
                            static_cast<int>((mouse.y - place.y) / place.px_per_image_px)});
 }
 
+// The targets beside the picture shown.
+std::vector<TargetMark> target_marks(const CaseState& loaded) {
+    std::vector<TargetMark> marks;
+    const Rigid probe_from = inverse(loaded.frame().record.tools.mannequin_from_probe);
+    const std::vector<Point3> centres = loaded.target_centres();
+    for (std::size_t i = 0; i < centres.size(); ++i) {
+        const Target& target = loaded.exercise().targets[i];
+        marks.push_back({probe_from * centres[i], target.radius_mm, tissue_words(target.name)});
+    }
+    return marks;
+}
+
 void show_image(const SessionView& session,
                 ScanControls& controls,
                 ViewState& view,
@@ -347,6 +361,13 @@ void show_image(const SessionView& session,
     input.marks = &view.tools.marks;
     add_names(view.hover, input);
     const ImagePlace place = draw_image_view(ui, area, input);
+    // The last hint.
+    if (session.scan.training.attempt && shows_targets(session.scan, loaded.exercise()) &&
+        loaded.frame().record.tools.has_probe && input.stopped.empty()) {
+        ui.clip(area);
+        draw_target_marks(ui, place, target_marks(loaded), input.flipped);
+        ui.unclip();
+    }
     pick_name(view, place, requests);
     if (view.educator.new_target.placing) {
         place_new_target(input.flipped, place, requests);

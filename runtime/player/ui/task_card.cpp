@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "formats/scoring/sight.h"
 #include "runtime/player/ui/panels.h"
 #include "runtime/player/ui/parts/panel_parts.h"
 #include "runtime/player/words/words.h"
@@ -14,26 +15,32 @@ namespace sonocase::runtime::inline player_ui {
 namespace {
 
 constexpr float kRow = 28;
+constexpr float kLeftFree = 3 * kRow + 52;  // for the values and the head of the hints
 
 const char* const kSteps[] = {"Find the target", "Bring the needle into the plane",
                               "Advance with the tip in view", "Stop in the middle"};
+// Of the mouse's tools, in each step.
+const char* const kStepKeys[] = {
+    "Arrows slide the probe, Shift + arrows tilt it, Q and E turn it.",
+    "N takes the needle, A and D aim it, W pushes it in.",
+    "W pushes, S pulls back. If the tip fades, stop and tilt the probe.",
+    "With the tip in the middle of the target, press B."};
+constexpr const char* kAllKeys = "Arrows: probe. N: needle. W, S: push, pull. B: end.";
 
 // Which of the four steps is to be done now; 4: all are.
 int present_step(const TaskCardInput& input) {
-    const FrameRecord& record = input.record;
-    if (std::find(input.targets_reached.begin(), input.targets_reached.end(), false) ==
-            input.targets_reached.end() &&
-        !input.targets_reached.empty())
+    const std::vector<bool>& reached = input.targets_reached;
+    if (!reached.empty() && std::find(reached.begin(), reached.end(), false) == reached.end())
         return 4;
-    const Point3 tip = record.needle.mannequin_from_drawn * Point3{0, 0, 0};
-    double nearest_plane = 1e9, nearest_tip = 1e9;
-    for (std::size_t i = 0; i < input.target_centres.size(); ++i) {
-        const Point3 p = inverse(record.tools.mannequin_from_probe) * input.target_centres[i];
-        if (p.z > 0) nearest_plane = std::min(nearest_plane, std::abs(p.y));
-        nearest_tip = std::min(nearest_tip, distance(tip, input.target_centres[i]));
-    }
-    if (record.tools.has_needle && record.needle.depth_mm > 0) return nearest_tip < 12 ? 3 : 2;
-    return record.tools.has_probe && nearest_plane < 5 ? 1 : 0;
+    const StepsDone& done = input.steps;
+    return !done.target_seen ? 0 : !done.needle_seen ? 1 : !done.tip_near ? 2 : 3;
+}
+
+// Small words where they fit whole.
+void draw_small(Ui& ui, Box& room, const std::string& words) {
+    const float high = ui.paragraph_height(room.w, words, Type::small);
+    if (high + kLeftFree > room.h) return;
+    ui.paragraph(room.take_top(high, 8), words, Type::small, colour::kDim);
 }
 
 void draw_steps(Ui& ui, Box& room, const TaskCardInput& input) {
@@ -52,7 +59,8 @@ void draw_steps(Ui& ui, Box& room, const TaskCardInput& input) {
     }
     const char* words = now < 4 ? kSteps[now] : "All targets reached";
     const float high = std::min(ui.paragraph_height(room.w, tr(words), Type::bold), 36.0f);
-    ui.paragraph(room.take_top(high, 8), tr(words), Type::bold, colour::kText, true);
+    ui.paragraph(room.take_top(high, 4), tr(words), Type::bold, colour::kText, true);
+    if (input.mouse && now < 4) draw_small(ui, room, tr(kStepKeys[now]));
 }
 
 void draw_values(Ui& ui, Box& room, const TaskCardInput& input) {
@@ -101,13 +109,44 @@ void draw_values(Ui& ui, Box& room, const TaskCardInput& input) {
             ui.paragraph(room, tr_message(view.problem), Type::small, colour::kBad, true));
 }
 
+// Where the nearest target lies beside the picture, and which way leads there.
+std::string where_target(const TaskCardInput& input) {
+    const Point3* nearest = nullptr;
+    Point3 at{0, 1e9, 0};
+    const Rigid probe_from = inverse(input.record.tools.mannequin_from_probe);
+    for (const Point3& centre : input.target_centres) {
+        const Point3 p = probe_from * centre;
+        if (std::abs(p.y) < std::abs(at.y)) {
+            at = p;
+            nearest = &centre;
+        }
+    }
+    if (!nearest || !input.record.tools.has_probe) return tr("The target is shown.");
+    const double beside = distance_to_image(input.exercise.probe, at.x, at.z);
+    if (std::abs(at.y) <= 3 && beside == 0) return tr("The target is in the picture, in the ring.");
+    const bool off_plane = std::abs(at.y) >= beside;
+    const double by_mm = off_plane ? std::abs(at.y) : beside;
+    if (!input.mouse)
+        return text(tr(off_plane ? "The target lies %.0f mm beside the plane."
+                                 : "The target lies %.0f mm beside the picture."),
+                    by_mm);
+    const bool right = (at.x > 0) != input.flipped;
+    const char* words =
+        off_plane ? (at.y > 0 ? "The target lies %.0f mm beside the plane: arrow up leads there."
+                              : "The target lies %.0f mm beside the plane: arrow down leads there.")
+        : at.z > 0 && std::abs(at.x) < 1 ? "The target lies %.0f mm beside the picture."
+        : right ? "The target lies %.0f mm beside the picture: arrow right leads there."
+                : "The target lies %.0f mm beside the picture: arrow left leads there.";
+    return text(tr(words), by_mm);
+}
+
 // Hints asked for so far, the last one in full; where that does not fit, one line and a button.
 void draw_hints(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
     const int count = static_cast<int>(input.exercise.hints.size());
     if (room.h < 44) return;
     const int shown = std::min(input.hints_shown, count);
     const std::string words = shown == 0                  ? ""
-                              : input.hints_shown > count ? std::string(tr("The target is shown."))
+                              : input.hints_shown > count ? where_target(input)
                                                           : input.exercise.hints[shown - 1];
     const float text_height =
         words.empty() ? 0 : ui.paragraph_height(room.w - 20, words, Type::small) + 10;
@@ -218,10 +257,10 @@ TaskCardRequest draw_task_card(Ui& ui, const Box& card, const TaskCardInput& inp
         (input.replays ? request.end_replay : request.toggle_attempt) = pressed;
     }
     draw_head(ui, room, input);
-    if (!input.attempt && !input.replays && room.h > 150) {
+    if (!input.replays && room.h > 150 && (input.mouse || !input.attempt)) {
         Box links = room.take_bottom(44, 8);
         ButtonStyle style;
-        if (input.has_result) {
+        if (input.has_result && !input.attempt) {
             style.icon = Icon::review;
             style.tip = "The result of the last attempt";
             const Box place = input.mouse ? links.take_left(44, 8) : links;
@@ -249,8 +288,9 @@ TaskCardRequest draw_task_card(Ui& ui, const Box& card, const TaskCardInput& inp
         return request;
     }
     if (input.attempt && !input.exam && room.h > 150) draw_steps(ui, room, input);
-    if (!input.attempt && !input.exercise.description.empty()) {
-        const float room_left = std::max(room.h - 3 * kRow, 0.0f);
+    if (input.attempt && input.exam && input.mouse) draw_small(ui, room, tr(kAllKeys));
+    if (!input.exercise.description.empty()) {
+        const float room_left = std::max(room.h - (input.attempt ? kLeftFree : 3 * kRow), 0.0f);
         const float high = std::min(
             ui.paragraph_height(room.w, input.exercise.description, Type::small), room_left);
         if (high >= 17)

@@ -19,7 +19,7 @@ void sensor_row(const char* tool, const SensorReading* reading, SensorVerdict ve
     switch (verdict) {
         case SensorVerdict::fine: break;
         case SensorVerdict::absent: packed = colour::kFaint, word = "none"; break;
-        case SensorVerdict::lost: packed = colour::kBad, word = "out of range"; break;
+        case SensorVerdict::lost: packed = colour::kBad, word = "out of view"; break;
         case SensorVerdict::stale: packed = colour::kBad, word = "silent"; break;
         case SensorVerdict::frozen: packed = colour::kBad, word = "frozen"; break;
         case SensorVerdict::jumped: packed = colour::kWarn, word = "jumped"; break;

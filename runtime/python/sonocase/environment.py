@@ -5,8 +5,10 @@
     picture, info = env.reset()
     picture, reward, terminated, truncated, info = env.step(env.action_space.sample())
 
-Follows the interface of Gymnasium (Farama Foundation) without importing it: `spaces` come from
-Gymnasium where it is installed, and from a class with the same members otherwise.
+Follows the interface of Gymnasium (Farama Foundation): where it is installed, the classes are a
+`gymnasium.Env` and a `gymnasium.vector.VectorEnv` and take its wrappers; otherwise they stand alone,
+with spaces of the same members. `reset(seed=n)` begins the same episode again; `reset()` goes on and
+draws another, the first with the `seed` of the constructor.
 
 Tasks, and their actions (numbers from -1 to 1, each a part of the greatest step):
 
@@ -25,6 +27,19 @@ import numpy as np
 
 from . import pose as _pose
 from ._core import Renderer
+
+try:
+    import gymnasium as _gymnasium
+    from gymnasium.vector import VectorEnv as _VectorEnv
+    _Env = _gymnasium.Env
+    try:
+        from gymnasium.vector import AutoresetMode
+        _NEXT_STEP = AutoresetMode.NEXT_STEP
+    except ImportError:  # before Gymnasium 1.1
+        _NEXT_STEP = "NextStep"
+except ImportError:
+    _Env = _VectorEnv = object
+    _NEXT_STEP = "NextStep"
 
 TASKS = ("find-view", "keep-needle", "reach-target")
 SLIDE_MM, TURN_RAD, PRESS_MM = 3.0, 0.05, 1.0
@@ -151,7 +166,7 @@ class _Episode:
         return reward, done, self.steps >= self.longest
 
 
-class VectorEnvironment:
+class VectorEnvironment(_VectorEnv):
     """Many environments that step together, their frames rendered on `threads` threads.
 
     cases     a Case or a list of cases, which take turns
@@ -162,7 +177,10 @@ class VectorEnvironment:
     used. The pictures do not depend on `threads`.
     """
 
-    metadata = {"render_modes": []}
+    metadata = {"render_modes": [], "autoreset_mode": _NEXT_STEP}
+    render_mode = None
+    spec = None
+    closed = False
 
     def __init__(self, cases, task="find-view", count=1, *, exercise=None, size=(128, 128), seed=0,
                  threads=1, longest=200, planes=(), model="", machine=""):
@@ -176,18 +194,25 @@ class VectorEnvironment:
         self._episodes = [_Episode(cases[r], self._renderers[r].exercise, task, longest)
                           for r in self._of]
         self._pictures = np.zeros((self.num_envs, size[1], size[0]), np.uint8)
-        self._seed, self._ended, self._frame = seed, np.ones(self.num_envs, bool), 0
+        self._ended = np.ones(self.num_envs, bool)
+        self._streams(seed)
         numbers = 10 if task == "reach-target" else 6
         self.single_action_space = _box(-1, 1, (numbers,), np.float32)
         self.single_observation_space = _box(0, 255, (size[1], size[0]), np.uint8)
         self.action_space = _box(-1, 1, (self.num_envs, numbers), np.float32)
         self.observation_space = _box(0, 255, self._pictures.shape, np.uint8)
 
-    def reset(self, *, seed=None, options=None):
-        self._seed = self._seed if seed is None else seed
-        self._frame = 0
-        streams = np.random.SeedSequence(self._seed).spawn(self.num_envs)
+    def _streams(self, seed):
+        streams = np.random.SeedSequence(seed).spawn(self.num_envs)
         self._random = [np.random.default_rng(s) for s in streams]
+        self._frame = -1
+
+    def reset(self, *, seed=None, options=None):
+        if seed is not None:
+            if _VectorEnv is not object:
+                super().reset(seed=seed)
+            self._streams(seed)
+        self._frame += 1
         for episode, random in zip(self._episodes, self._random):
             episode.reset(random)
         self._ended[:] = False
@@ -231,11 +256,12 @@ class VectorEnvironment:
         return {"facts": facts, "planes": planes,
                 "contact": np.array([f["contact"] for f in facts])}
 
-    def close(self):
+    def close(self, **_):
         self._renderers = []
+        self.closed = True
 
 
-class Environment:
+class Environment(_Env):
     """One environment; the arguments of VectorEnvironment without `count`."""
 
     metadata = {"render_modes": []}
@@ -257,6 +283,8 @@ class Environment:
                 "contact": float(info["contact"][0])}
 
     def reset(self, *, seed=None, options=None):
+        if _Env is not object:
+            super().reset(seed=seed)
         pictures, info = self._all.reset(seed=seed, options=options)
         return pictures[0], self._one(info)
 

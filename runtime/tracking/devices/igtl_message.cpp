@@ -42,27 +42,32 @@ std::string text_of(std::span<const std::uint8_t> b, std::size_t at, std::size_t
     return text;
 }
 
-// Twelve floats, column by column. Nothing for a motion that is not rigid: no tracker sends one.
-std::optional<Rigid> matrix_at(std::span<const std::uint8_t> b, std::size_t at) {
+// Twelve floats, column by column.
+NamedPose matrix_at(std::span<const std::uint8_t> b, std::size_t at) {
+    NamedPose pose;
     Rigid t;
     for (int c = 0; c < 4; ++c) {
         for (int r = 0; r < 3; ++r) {
             const double v = big_float(b, at + 4 * static_cast<std::size_t>(3 * c + r));
-            if (!std::isfinite(v)) return std::nullopt;
             (c < 3 ? t.rotation(r, c) : t.translation[r]) = v;
         }
     }
-    if (!(orthonormality_error(t.rotation) < 1e-2) || !(determinant(t.rotation) > 0)) {
-        return std::nullopt;
+    if (!is_finite(t)) {
+        pose.fault = PoseFault::not_finite;
+    } else if (!(determinant(t.rotation) >= 0)) {
+        pose.fault = PoseFault::mirrored;
+    } else if (!(orthonormality_error(t.rotation) < 1e-2)) {
+        pose.fault = PoseFault::scaled;
+    } else {
+        t.rotation = nearest_rotation(t.rotation);  // single precision is off by 1e-7
+        pose.to_from = t;
     }
-    t.rotation = nearest_rotation(t.rotation);  // single precision is off by 1e-7
-    return t;
+    return pose;
 }
 
 // Position and quaternion x, y, z, w.
-std::optional<Rigid> quaternion_at(std::span<const std::uint8_t> b,
-                                   std::size_t at,
-                                   std::size_t parts) {
+NamedPose quaternion_at(std::span<const std::uint8_t> b, std::size_t at, std::size_t parts) {
+    NamedPose pose;
     Rigid t;
     double q[4] = {0, 0, 0, 1};
     for (std::size_t i = 0; i < 3; ++i)
@@ -72,9 +77,15 @@ std::optional<Rigid> quaternion_at(std::span<const std::uint8_t> b,
         q[3] = std::sqrt(std::max(0.0, 1 - q[0] * q[0] - q[1] * q[1] - q[2] * q[2]));
     }
     const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    if (!is_finite(t) || !(std::abs(length - 1) < 0.05)) return std::nullopt;
-    t.rotation = rotation_from_quaternion({q[3], q[0], q[1], q[2]});
-    return t;
+    if (!is_finite(t) || !std::isfinite(length)) {
+        pose.fault = PoseFault::not_finite;
+    } else if (!(std::abs(length - 1) < 0.05)) {
+        pose.fault = PoseFault::scaled;
+    } else {
+        t.rotation = rotation_from_quaternion({q[3], q[0], q[1], q[2]});
+        pose.to_from = t;
+    }
+    return pose;
 }
 
 bool is_ours(const std::string& type) {
@@ -118,12 +129,48 @@ namespace {
 
 // Versions 2 and 3 put an extended header before the content and metadata after it. Empty where
 // that does not fit.
-std::span<const std::uint8_t> content_of(const Header& header, std::span<const std::uint8_t> body) {
+std::span<const std::uint8_t> content_of(const Header& header,
+                                         std::span<const std::uint8_t> body,
+                                         std::span<const std::uint8_t>* metadata = nullptr) {
     if (header.version < 2) return body;
     if (body.size() < 12) return {};
     const std::size_t extended = big(body, 0, 2), meta = big(body, 2, 2) + big(body, 4, 4);
     if (extended < 12 || extended + meta > body.size()) return {};
+    if (metadata) *metadata = body.last(meta);
     return body.subspan(extended, body.size() - extended - meta);
+}
+
+// Calls use(key, value) for each entry: a count, the sizes of all, then keys and values.
+template <class Use>
+void each_entry(std::span<const std::uint8_t> metadata, Use use) {
+    if (metadata.size() < 2) return;
+    const std::size_t count = big(metadata, 0, 2);
+    std::size_t at = 2 + 8 * count;
+    for (std::size_t i = 0; i < count && at <= metadata.size(); ++i) {
+        const std::size_t key = big(metadata, 2 + 8 * i, 2), value = big(metadata, 6 + 8 * i, 4);
+        if (key > metadata.size() - at || value > metadata.size() - at - key) return;
+        const auto text = [&](std::size_t from, std::size_t size) {
+            return std::string_view(reinterpret_cast<const char*>(metadata.data()) + from, size);
+        };
+        use(text(at, key), text(at + key, value));
+        at += key + value;
+    }
+}
+
+// Marks the poses that the metadata says are none: TransformStatus for all of the message, or
+// NAMEStatus and NAMETransformStatus for one of a list, with another value than OK.
+void mark_lost(std::span<const std::uint8_t> metadata, std::vector<NamedPose>& poses) {
+    each_entry(metadata, [&](std::string_view key, std::string_view value) {
+        if (!key.ends_with("Status") && !key.ends_with("status")) return;
+        while (!value.empty() && (value.back() == ' ' || value.back() == 0)) value.remove_suffix(1);
+        if (value == "OK" || value == "ok" || value == "VALID" || value.empty()) return;
+        key.remove_suffix(6);
+        for (NamedPose& pose : poses) {
+            if (key.empty() || key == "Transform" || key == pose.name ||
+                key == pose.name + "Transform")
+                pose = {pose.name, {}, PoseFault::lost};
+        }
+    });
 }
 
 }  // namespace
@@ -138,10 +185,12 @@ std::optional<double> parse_force_n(const Header& header, std::span<const std::u
 }
 
 std::vector<NamedPose> parse_poses(const Header& header, std::span<const std::uint8_t> body) {
-    body = content_of(header, body);
+    std::span<const std::uint8_t> metadata;
+    body = content_of(header, body, &metadata);
     std::vector<NamedPose> poses;
-    const auto add = [&](const std::string& name, const std::optional<Rigid>& pose) {
-        if (pose) poses.push_back({name, *pose});
+    const auto add = [&](const std::string& name, NamedPose pose) {
+        pose.name = name;
+        poses.push_back(std::move(pose));
     };
     if (header.type == "TRANSFORM" && body.size() == 48) {
         add(header.device, matrix_at(body, 0));
@@ -157,6 +206,7 @@ std::vector<NamedPose> parse_poses(const Header& header, std::span<const std::ui
             add(text_of(body, at, 20), quaternion_at(body, at + 22, 4));
         }
     }
+    mark_lost(metadata, poses);
     return poses;
 }
 
@@ -185,6 +235,13 @@ std::vector<std::uint8_t> encode_transform(std::string_view device, double time_
     }
     for (int r = 0; r < 3; ++r) put_float(body, t.translation[r]);
     return encode("TRANSFORM", device, time_s, body);
+}
+
+std::vector<std::uint8_t> encode_request(double time_s) {
+    std::vector<std::uint8_t> body;
+    put(body, 16, 4);
+    put_text(body, "", 32);
+    return encode("STT_TDATA", "", time_s, body);
 }
 
 std::vector<std::uint8_t> encode_sensor(std::string_view device,

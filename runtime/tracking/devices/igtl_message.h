@@ -38,12 +38,21 @@ struct Header {
 // bytes: at least kHeaderSize. Versions 1 to 3 share this header; nothing for other versions.
 std::optional<Header> parse_header(std::span<const std::uint8_t> bytes);
 
+// Why a pose is none.
+enum class PoseFault : std::uint8_t {
+    none,
+    lost,        // the sender says so: metadata of versions 2 and 3, ...Status = INVALID, MISSING
+    not_finite,  // NaN or infinite
+    scaled,      // no rigid motion: mm per pixel in its columns, or all zeros
+    mirrored,    // left-handed
+};
 struct NamedPose {
     std::string name;
-    Rigid to_from;  // mm
+    Rigid to_from;  // mm; the identity where there is a fault
+    PoseFault fault = PoseFault::none;
 };
 // The poses of a TRANSFORM, TDATA, QTDATA, POSITION or QTRANS body; a single pose has the device's
-// name. Empty: the body does not fit its type, or holds no rigid motion.
+// name. Empty: the body does not fit its type.
 std::vector<NamedPose> parse_poses(const Header& header, std::span<const std::uint8_t> body);
 
 // Newtons on the probe's face: the first number of a SENSOR body of device ProbeForce, whatever
@@ -60,6 +69,8 @@ std::vector<std::uint8_t> encode(std::string_view type,
 std::vector<std::uint8_t> encode_sensor(std::string_view device,
                                         double time_s,
                                         std::span<const double> values);
+// A request of a client, as STT_TDATA: every 16 ms, in the sender's own coordinates.
+std::vector<std::uint8_t> encode_request(double time_s);
 std::vector<std::uint8_t> encode_transform(std::string_view device,
                                            double time_s,
                                            const Rigid& to_from);

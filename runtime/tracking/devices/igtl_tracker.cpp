@@ -100,35 +100,43 @@ void IgtlTracker::converse(Socket socket) {
         ++health_.connects;
     }
     reading_ = {};
+    reference_ = {};
+    heard_ = {};
     std::fill(names_.begin(), names_.end(), std::string());
     last_s_ = -1;
     igtl::MessageReader reader;
     std::array<std::uint8_t, 16384> buffer;
-    double heard_s = clock_();
+    double heard_s = heard_.since_s = clock_();
     Message ended = "The other side closed the connection.";
     while (!stop_) {
         const long n = socket.read(buffer, 0.1);
         if (n < 0) break;
+        const double now_s = clock_();
+        explain(now_s);
         if (n == 0) {
-            // Some servers stream only on request: once it is silent, it is asked for TDATA.
-            if (clock_() - heard_s > options_.silence_s) {
+            if (now_s - heard_s > options_.silence_s) {
                 ended = "The connection fell silent.";
                 break;
             }
+            // Some servers stream only on request.
+            if (now_s - std::max(heard_s, heard_.asked_s) > options_.ask_s) {
+                heard_.asked_s = now_s;
+                if (socket.write(igtl::encode_request(now_s)) < 0) break;
+            }
             if (options_.listening) {
                 // One client at a time is read; a new one takes over from a silent one.
-                if (clock_() - heard_s > 0.5) {
+                if (now_s - heard_s > 0.5) {
                     Socket next = listener_.accept(0);
                     if (next.open()) {
                         socket = std::move(next);
                         reader = {};
-                        heard_s = clock_();
+                        heard_s = now_s;
                     }
                 }
             }
             continue;
         }
-        heard_s = clock_();
+        heard_s = now_s;
         reader.add({buffer.data(), static_cast<std::size_t>(n)});
         for (bool more = true; more;) {
             switch (reader.next()) {
@@ -140,13 +148,18 @@ void IgtlTracker::converse(Socket socket) {
                         reading_.force_n = *force;
                     } else if (!poses.empty()) {
                         take(poses, reader.header().time_s);
-                    } else if (!reader.body().empty() && reader.header().type != "SENSOR") {
-                        const std::lock_guard lock(mutex_);
-                        ++health_.bad_frames;
+                    } else {
+                        ++heard_.others;
+                        heard_.other_type = reader.header().type;
+                        if (!reader.body().empty() && reader.header().type != "SENSOR") {
+                            const std::lock_guard lock(mutex_);
+                            ++health_.bad_frames;
+                        }
                     }
                     break;
                 }
                 case igtl::MessageReader::Event::bad_crc: {
+                    ++heard_.wrong_checksum;
                     const std::lock_guard lock(mutex_);
                     ++health_.bad_frames;
                     break;
@@ -166,18 +179,103 @@ void IgtlTracker::converse(Socket socket) {
     set_health(TrackerPhase::searching, ended);
 }
 
-int IgtlTracker::sensor_of(const std::string& name) {
+// What came instead of a pose of the probe; empty: all is well.
+Message IgtlTracker::what_came() const {
+    const auto count = [](std::uint64_t n) { return Message(std::to_string(n)); };
+    if (heard_.poses[kProbeSensor] > 0) {
+        // No tracker measures a probe that long so near to its own origin.
+        if (heard_.poses[kProbeSensor] > 60 && heard_.farthest_mm < 2)
+            return {
+                "No place of {} lies farther than 2 mm from the origin: these look like "
+                "metres; send millimetres.",
+                {names_[kProbeSensor]}};
+        return {};
+    }
+    if (heard_.wrong_checksum > 0)
+        return {"{} messages came with a wrong checksum; have the sender compute checksums (CRC).",
+                {count(heard_.wrong_checksum)}};
+    if (heard_.mirrored > 0)
+        return {"{} is mirrored (left-handed); negate one axis in the sender.",
+                {heard_.mirrored_name}};
+    if (heard_.scaled > 0)
+        return {
+            "{} has a scale, so that it is no pose; send the probe's own transform, such as "
+            "ProbeToReference.",
+            {heard_.scaled_name}};
+    std::size_t most = 0;
+    for (std::size_t i = 2; i < heard_.poses.size(); ++i) {
+        if (heard_.poses[i] > heard_.poses[most]) most = i;
+    }
+    if (most > 0)
+        return {
+            "{} transforms {} came, none of a probe; send ProbeTo..., TransducerTo... or "
+            "ImageTo..., or say --tool probe={}.",
+            {count(heard_.poses[most]), names_[most], names_[most]}};
+    if (heard_.not_finite > 0)
+        return {"{} transforms came that hold no numbers (NaN); check the sender.",
+                {count(heard_.not_finite)}};
+    if (heard_.poses[kNeedleSensor] > 0)
+        return {
+            "The needle's pose comes and none of the probe; send ProbeTo..., TransducerTo... "
+            "or ImageTo... as well."};
+    if (heard_.others > 0)
+        return {
+            "{} messages came, none with a pose; the last is of type {}. Send TRANSFORM or "
+            "TDATA.",
+            {count(heard_.others), heard_.other_type}};
+    if (heard_.asked_s > 0)
+        return "Connected, but nothing comes, though the sender was asked for TDATA; start its "
+               "stream.";
+    return {};
+}
+
+void IgtlTracker::explain(double now_s) {
+    if (now_s - heard_.since_s < options_.explain_s || now_s - heard_.explained_s < 0.5) return;
+    heard_.explained_s = now_s;
+    const Message message = what_came();
+    const std::lock_guard lock(mutex_);
+    if (!message.empty() || health_.phase == TrackerPhase::streaming) health_.message = message;
+}
+
+// A role that the user gave a name to is played by that name alone. Headers cut names at 20 signs.
+bool IgtlTracker::plays(const std::string& role, const std::string& name) const {
+    bool given = false;
+    for (const auto& [other, wanted] : options_.tools) {
+        if (other != role) continue;
+        given = true;
+        if (name == wanted || name == wanted.substr(0, 20)) return true;
+    }
+    if (given) return false;
+    for (const auto& [other, wanted] : options_.tools) {
+        if (name == wanted || name == wanted.substr(0, 20)) return false;  // plays another
+    }
+    if (role == "probe") return begins_with_any(name, {"Probe", "Transducer", "Image"});
+    if (role == "needle") return begins_with_any(name, {"Needle", "Stylus"});
+    return false;
+}
+
+int IgtlTracker::known_sensor(const std::string& name) const {
     for (int i = 0; i < kMaxSensors; ++i) {
         if (names_[i] == name) return i;
     }
-    int wanted = -1;
-    if (begins_with_any(name, {"Probe", "Transducer", "Image"})) wanted = kProbeSensor;
-    if (begins_with_any(name, {"Needle", "Stylus"})) wanted = kNeedleSensor;
+    return -1;
+}
+
+int IgtlTracker::sensor_of(const std::string& name) {
+    if (const int known = known_sensor(name); known >= 0) return known;
+    const int wanted = plays("probe", name)    ? kProbeSensor
+                       : plays("needle", name) ? kNeedleSensor
+                                               : -1;
     const auto take_place = [&](int i) {
         names_[i] = name;
+        heard_.poses[i] = 0;
         return i;
     };
-    if (wanted >= 0 && names_[wanted].empty()) return take_place(wanted);
+    // The probe itself is preferred to its image.
+    const bool image_gives_way = wanted == kProbeSensor &&
+                                 names_[kProbeSensor].rfind("Image", 0) == 0 &&
+                                 name.rfind("Image", 0) != 0;
+    if (wanted >= 0 && (names_[wanted].empty() || image_gives_way)) return take_place(wanted);
     // The sensors of named tools are kept free for them.
     for (int i = 2; i < kMaxSensors; ++i) {
         if (names_[i].empty()) return take_place(i);
@@ -185,20 +283,72 @@ int IgtlTracker::sensor_of(const std::string& name) {
     return -1;
 }
 
+void IgtlTracker::note(const igtl::NamedPose& pose) {
+    switch (pose.fault) {
+        case igtl::PoseFault::scaled:
+            ++heard_.scaled;
+            heard_.scaled_name = pose.name;
+            break;
+        case igtl::PoseFault::mirrored:
+            ++heard_.mirrored;
+            heard_.mirrored_name = pose.name;
+            break;
+        case igtl::PoseFault::not_finite: ++heard_.not_finite; break;
+        case igtl::PoseFault::lost:
+        case igtl::PoseFault::none: return;
+    }
+    const std::lock_guard lock(mutex_);
+    ++health_.bad_frames;
+}
+
 void IgtlTracker::take(const std::vector<igtl::NamedPose>& poses, double device_time_s) {
     const double now_s = clock_();
+    constexpr double kReferenceS = 0.25;  // as long as a tool may be silent
+    const auto put = [&](SensorReading& sensor, const igtl::NamedPose& pose) {
+        sensor.time_s = now_s;
+        sensor.state = pose.fault == igtl::PoseFault::none ? SensorState::ok : SensorState::lost;
+        // A lost sensor keeps the last good pose.
+        if (sensor.state == SensorState::ok) sensor.world_from_sensor = pose.to_from;
+    };
     bool any = false;
     for (const igtl::NamedPose& pose : poses) {
-        const int i = sensor_of(pose.name);
+        if (!plays("reference", pose.name)) continue;
+        note(pose);
+        put(reference_, pose);
+    }
+    const bool relative = std::any_of(options_.tools.begin(), options_.tools.end(),
+                                      [](const auto& tool) { return tool.first == "reference"; });
+    const bool referenced = !relative || (reference_.state == SensorState::ok &&
+                                          now_s - reference_.time_s <= kReferenceS);
+    for (igtl::NamedPose pose : poses) {
+        if (plays("reference", pose.name)) continue;
+        note(pose);
+        const bool good = pose.fault == igtl::PoseFault::none;
+        const int i = good ? sensor_of(pose.name) : known_sensor(pose.name);
         if (i < 0) continue;
         SensorReading& sensor = reading_.sensors[i];
-        sensor.state = SensorState::ok;
-        sensor.world_from_sensor = pose.to_from;
+        sensor.in_mannequin = to_mannequin(pose.name);
+        if (good) {
+            ++heard_.poses[static_cast<std::size_t>(i)];
+            if (i == kProbeSensor)
+                heard_.farthest_mm = std::max(heard_.farthest_mm, norm(pose.to_from.translation));
+        }
+        if (!sensor.in_mannequin && relative) {
+            pose.to_from = inverse(reference_.world_from_sensor) * pose.to_from;
+            if (!referenced) pose.fault = igtl::PoseFault::lost;
+        }
+        put(sensor, pose);
         reading_.sensor_count = std::max(reading_.sensor_count, i + 1);
-        reading_.in_mannequin = to_mannequin(pose.name);
         any = true;
     }
     if (!any) return;
+    // Of the tools alone: a reference in the same stream says nothing about theirs.
+    bool in_mannequin = false, in_tracker = false;
+    for (const int i : {kProbeSensor, kNeedleSensor}) {
+        if (names_[i].empty()) continue;
+        (to_mannequin(names_[i]) ? in_mannequin : in_tracker) = true;
+    }
+    reading_.in_mannequin = in_mannequin && !in_tracker;
     reading_.time_s = now_s;
     reading_.device_time_s = device_time_s > 0 ? device_time_s : -1;
     const std::lock_guard lock(mutex_);

@@ -4,6 +4,7 @@
 // connects to it (listening).
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <functional>
 #include <memory>
@@ -14,6 +15,7 @@
 #include "formats/base/mailbox.h"
 #include "formats/base/result.h"
 #include "runtime/tracking/devices/igtl_message.h"
+#include "runtime/tracking/devices/make_tracker.h"
 #include "runtime/tracking/devices/socket.h"
 #include "runtime/tracking/tracker.h"
 
@@ -25,13 +27,20 @@ struct IgtlTrackerOptions {
     bool listening = false;
     double retry_s = 0.5;
     double silence_s = 5;  // a connection on which no byte came for so long is opened again
+    double ask_s = 0.5;    // silent for so long, the sender is asked for TDATA
+    // After so long without a pose of the probe, health() says what came instead.
+    double explain_s = 1.5;
+    ToolNames tools;  // which transform is which tool; empty: by its name
 };
 
 // A device's name says which tool it is: one that begins with Probe, Transducer or Image is the
 // probe, one that begins with Needle or Stylus the needle; others take the next free sensors in
-// order. The pose of a name that ends in ToMannequin is that of the tool in `mannequin`. A SENSOR
-// message of device ProbeForce gives the newtons on the probe's face, which come with the next
-// pose.
+// order. The pose of a name that ends in ToMannequin is that of the tool in `mannequin`. With a
+// transform for the role `reference`, all others are taken relative to it. A SENSOR message of
+// device ProbeForce gives the newtons on the probe's face, which come with the next pose.
+//
+// Each sensor keeps the time of its own last pose. One whose sender calls it invalid, or sends no
+// numbers for it, is lost.
 class IgtlTracker final : public Tracker {
   public:
     static Result<std::unique_ptr<Tracker>> start(const IgtlTrackerOptions& options,
@@ -49,7 +58,21 @@ class IgtlTracker final : public Tracker {
     void converse(Socket socket);
     void take(const std::vector<igtl::NamedPose>& poses, double device_time_s);
     int sensor_of(const std::string& name);
+    int known_sensor(const std::string& name) const;  // -1: none yet
+    bool plays(const std::string& role, const std::string& name) const;
+    void note(const igtl::NamedPose& pose);
+    void explain(double now_s);
+    Message what_came() const;
     void set_health(TrackerPhase phase, const Message& message);
+
+    // What came on this connection, for the sentence that says why there is no pose.
+    struct Heard {
+        double since_s = 0, explained_s = 0, asked_s = 0;
+        std::uint64_t wrong_checksum = 0, scaled = 0, mirrored = 0, not_finite = 0, others = 0;
+        std::string scaled_name, mirrored_name, other_type;
+        std::array<std::uint64_t, kMaxSensors> poses{};
+        double farthest_mm = 0;  // place of the probe
+    };
 
     IgtlTrackerOptions options_;
     SessionClock clock_;
@@ -58,6 +81,8 @@ class IgtlTracker final : public Tracker {
     Mailbox<TrackerReading> box_;
     TrackerReading reading_;
     std::vector<std::string> names_;  // # sensors; empty: the sensor is free
+    Heard heard_;
+    SensorReading reference_;  // absent: none has come
     mutable std::mutex mutex_;
     TrackerHealth health_;
     std::function<void()> wake_;

@@ -69,17 +69,15 @@ Made make_sweep(const std::string& name, const TrackerContext& context) {
 }
 
 Made make_replay(const std::string& files, const TrackerContext& context) {
-    SONOCASE_TRY(Recording recording, load_recording(files));
     // In a recording of this player both tools were seen at the same time; recordings of sensors
     // may have a lag.
-    if (!recording.in_mannequin) {
-        for (Pose& pose : recording.needle) pose.timestamp_s -= context.needle_lag_s;
-    }
+    SONOCASE_TRY(Recording recording, load_recording(files, context.needle_lag_s));
     return Made(std::make_unique<ReplayTracker>(std::move(recording), context.loop));
 }
 
 Made make_igtl(const std::string& argument, const TrackerContext& context) {
     IgtlTrackerOptions options;
+    options.tools = context.tools;
     std::string address = argument;
     if (address.rfind("listen:", 0) == 0) {
         options.listening = true;
@@ -126,6 +124,22 @@ std::string tracker_help() {
     for (const TrackerKind& kind : kTrackers)
         help += (help.empty() ? "" : " | ") + std::string(kind.help);
     return help;
+}
+
+Result<ToolNames> parse_tool_names(const std::vector<std::string>& texts) {
+    ToolNames tools;
+    for (const std::string& text : texts) {
+        const std::size_t sign = text.find('=');
+        const std::string role = text.substr(0, sign);
+        if (sign == std::string::npos || sign + 1 == text.size() ||
+            (role != "probe" && role != "needle" && role != "reference")) {
+            return Error{"not a tool: " + text, "--tool",
+                         "use ROLE=NAME with probe, needle or reference, e.g. "
+                         "needle=StylusTipToTracker"};
+        }
+        tools.emplace_back(role, text.substr(sign + 1));
+    }
+    return tools;
 }
 
 Made make_tracker(const std::string& spec, const TrackerContext& context) {

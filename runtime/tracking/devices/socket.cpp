@@ -138,6 +138,8 @@ long Socket::write(std::span<const std::uint8_t> bytes) {
 bool split_address(const std::string& text, std::string& host, int& port) {
     const std::size_t colon = text.rfind(':');
     if (colon != std::string::npos && colon > 0) host = text.substr(0, colon);
+    if (host.size() > 2 && host.front() == '[' && host.back() == ']')
+        host = host.substr(1, host.size() - 2);  // an address of version 6
     const std::string digits = colon == std::string::npos ? text : text.substr(colon + 1);
     if (digits.empty() || digits.size() > 5 ||
         digits.find_first_not_of("0123456789") != std::string::npos) {

@@ -41,8 +41,8 @@ class Socket {
     int descriptor_ = -1;
 };
 
-// Splits "HOST:PORT", ":PORT" or "PORT"; `host` stays as it was if none is given. False: `text` is
-// none of these.
+// Splits "HOST:PORT", "[::1]:PORT", ":PORT" or "PORT"; `host` stays as it was if none is given.
+// False: `text` is none of these.
 bool split_address(const std::string& text, std::string& host, int& port);
 
 }  // namespace sonocase::runtime::inline tracking_devices

@@ -2,7 +2,7 @@
 
 // The pages and the ways between them: cases, scanning, after an attempt, scores.
 import {Core, PlainError, has_simd} from './core.js';
-import {download, file_name, keep_attempt, kept_attempts, minutes, remove_attempts, send_statements, set_trainee, statement, trainee} from './results.js';
+import {download, file_name, keep_attempt, kept_attempts, launch_of, minutes, remove_attempts, send_statements, set_trainee, statement, trainee} from './results.js';
 import {PoseSource} from './poses.js';
 import {ScanPage} from './scan.js';
 import {ArrivingCase} from './arriving.js';
@@ -83,6 +83,8 @@ class App {
                 return core;
             } catch (error) {
                 if (error instanceof PlainError) throw error;
+                if (error instanceof RangeError || /memory/i.test(error?.message ?? ''))
+                    throw new PlainError('There is not enough memory for the program. Close other pages and load this page again.');
                 throw new PlainError('The program did not load. Check the network and load the page again.');
             }
         })();
@@ -286,8 +288,10 @@ class App {
         this.settled = this.started;  // kept and sent, or said that it was not
     }
     send(which) {
-        const endpoint = this.list?.xapi ?? '';
-        return send_statements(endpoint, which.map(([verb, attempt, score]) => statement(verb, attempt, score)));
+        const published = this.list?.xapi ?? '';
+        const launch = launch_of(location.search, published);
+        return send_statements(launch?.endpoint ?? published,
+            which.map(([verb, attempt, score]) => statement(verb, attempt, score, launch)), launch?.auth);
     }
 
     show_after(score) {

@@ -85,23 +85,52 @@ const kVerb = {
     scored: 'http://adlnet.gov/expapi/verbs/scored',
 };
 
-// An xAPI 1.0.3 statement. verb: of kVerb. score: of score_json, or null.
-export function statement(verb, attempt, score) {
+// What a learning platform's xAPI launch puts into the page's address: endpoint, auth, actor,
+// registration, activity_id. published: the endpoint that this site was published with; a launch may
+// name another path and key, but no other host. Null: no launch.
+export function launch_of(search, published) {
+    const asked = new URLSearchParams(search);
+    const endpoint = asked.get('endpoint');
+    if (!endpoint || !published) return null;
+    let actor = null;
+    try {
+        if (new URL(endpoint).origin !== new URL(published, location.href).origin) return null;
+        actor = JSON.parse(asked.get('actor') ?? 'null');
+    } catch {
+        return null;
+    }
+    if (actor && typeof actor === 'object') {
+        // Platforms of before 1.0 write lists.
+        for (const [key, value] of Object.entries(actor)) if (Array.isArray(value)) [actor[key]] = value;
+        actor.objectType ??= 'Agent';
+    }
+    return {endpoint, actor, auth: asked.get('auth') ?? '', registration: asked.get('registration') ?? '',
+        activity: asked.get('activity_id') ?? ''};
+}
+
+const seconds_since = (started) => Math.max(0, (Date.now() - Date.parse(started)) / 1000);
+
+// An xAPI 1.0.3 statement. verb: of kVerb. score: of score_json, or null. launch: of launch_of.
+export function statement(verb, attempt, score, launch = null) {
     const site = location.href.replace(/[?#].*/, '');
     const out = {
-        actor: {objectType: 'Agent', account: {homePage: site, name: attempt.trainee || 'nobody'}},
+        id: crypto.randomUUID?.(),
+        actor: launch?.actor ?? {objectType: 'Agent', account: {homePage: site, name: attempt.trainee || 'nobody'}},
         verb: {id: kVerb[verb], display: {en: verb}},
         object: {
             objectType: 'Activity',
-            id: `${site}?case=${encodeURIComponent(attempt.case_name)}&exercise=${encodeURIComponent(attempt.exercise)}`,
+            id: launch?.activity || `${site}?case=${encodeURIComponent(attempt.case_name)}&exercise=${encodeURIComponent(attempt.exercise)}`,
             definition: {name: {en: attempt.title}, type: 'http://adlnet.gov/expapi/activities/simulation'},
         },
-        timestamp: attempt.started,
+        timestamp: score ? new Date().toISOString() : attempt.started,
     };
+    if (launch?.registration) out.context = {registration: launch.registration};
     if (score) {
         const extensions = {};
         for (const [name, value] of Object.entries(score.metrics)) extensions[`${site}#${name}`] = value;
         out.result = {success: score.passed, completion: true, extensions};
+        const taken_s = seconds_since(attempt.started);
+        if (Number.isFinite(taken_s)) out.result.duration = `PT${taken_s.toFixed(2)}S`;
         const marks = score.pass_marks;
         if (verb === 'scored' && marks.length)
             out.result.score = {scaled: marks.filter((mark) => mark.passed).length / marks.length};
@@ -109,14 +138,16 @@ export function statement(verb, attempt, score) {
     return out;
 }
 
-// endpoint: the store's address, "" for none. Returns true if the store took them all.
-export async function send_statements(endpoint, statements) {
+// endpoint: the store's address, "" for none. auth: the Authorization that the launch gave; "": none.
+// Returns true if the store took them all.
+export async function send_statements(endpoint, statements, auth = '') {
     if (!endpoint) return true;
     try {
         const response = await fetch(`${endpoint.replace(/\/$/, '')}/statements`, {
             method: 'POST',
-            credentials: 'include',
-            headers: {'Content-Type': 'application/json', 'X-Experience-API-Version': '1.0.3'},
+            credentials: 'same-origin',  // stores that answer any origin take no cookies
+            headers: {'Content-Type': 'application/json', 'X-Experience-API-Version': '1.0.3',
+                ...auth ? {Authorization: auth} : {}},
             body: JSON.stringify(statements),
         });
         return response.ok;

@@ -157,6 +157,48 @@ TEST(Needle, SpinAgreesWithPinholesOrSaysSo) {
     EXPECT_NE(other.sentence.find("disagree"), std::string::npos);
 }
 
+TEST(Needle, OnePivotAndOneSpinGiveTipAndDirection) {
+    Random random(8);
+    Truth truth;
+    truth.tip = {5, -3, -120};
+    truth.direction = {0, 0, -1};
+    Truth tip_alone = truth;
+    tip_alone.depths = {0};
+    const PointFit pivot = fit_point(pinholes(tip_alone, 0.1, random)[0]);
+    for (const double sign : {1.0, -1.0}) {  // a spin does not know which way it points
+        Truth turned = truth;
+        turned.direction = sign * truth.direction;
+        const NeedleFit fit =
+            join_pivot_and_spin(pivot, fit_needle_spin(spin(turned, 0.05, 0, random)));
+        ASSERT_TRUE(fit.determined) << fit.problem;
+        EXPECT_LT(norm(fit.tip_mm - truth.tip), 0.2);
+        EXPECT_LT(angle(fit.direction, truth.direction), 0.2 * kRadPerDeg);
+        EXPECT_TRUE(fit.tip_measured);
+        EXPECT_LT(std::max({fit.tip_sigma_mm.x, fit.tip_sigma_mm.y, fit.tip_sigma_mm.z}), 0.2);
+        for (const std::string& warning : fit.warnings)
+            EXPECT_EQ(warning.find("neither the tip"), std::string::npos) << warning;
+    }
+    // Bent: the tip lies 6 mm beside the spun axis.
+    Truth bent = truth;
+    bent.tip = truth.tip + Vector3{6, 0, 0};
+    const NeedleFit off = join_pivot_and_spin(pivot, fit_needle_spin(spin(bent, 0.05, 0, random)));
+    EXPECT_TRUE(std::any_of(off.warnings.begin(), off.warnings.end(), [](const std::string& w) {
+        return w.find("6.0 mm beside the axis") != std::string::npos;
+    }));
+    // Neither without the other.
+    EXPECT_NE(join_pivot_and_spin(fit_point({}), fit_needle_spin(spin(truth, 0.05, 0, random)))
+                  .problem.find("the pivot has no answer"),
+              std::string::npos);
+    EXPECT_NE(join_pivot_and_spin(pivot, fit_needle_spin({})).problem.find("the spin has no"),
+              std::string::npos);
+    // Across the axis from the sensor: the sign is not known.
+    Truth across = truth;
+    across.direction = {0, 1, 0};
+    EXPECT_NE(join_pivot_and_spin(pivot, fit_needle_spin(spin(across, 0.05, 0, random)))
+                  .problem.find("its sign is not known"),
+              std::string::npos);
+}
+
 TEST(Needle, TroubleHasItsOwnWords) {
     Random random(7);
     Truth truth;

@@ -26,6 +26,7 @@ ProgressEntry entry(const std::string& trainee, int number) {
     e.case_name = "demo";
     e.exercise = number % 2 ? "liver" : "kidney";
     e.started = "2026-01-01T00:00:" + std::to_string(10 + number) + "Z";
+    e.recording = std::to_string(number) + ".igs.mha";
     e.passed = number % 3 == 0;
     e.seed = 1000 + static_cast<std::uint64_t>(number);
     e.metrics = {{"elapsed_time_s", 1.0 / 3 + number}, {"targets_hit", 1}};
@@ -88,6 +89,21 @@ TEST(ProgressBook, OneOfVersionOneIsBroughtUpToDate) {
     EXPECT_EQ((*all)[0].id, 7);
     EXPECT_EQ((*all)[0].seed, 0u);
     EXPECT_EQ((*all)[1].seed, 1003u);
+}
+
+// The start is known to the second only.
+TEST(ProgressBook, AttemptsOfOneSecondStandSideBySide) {
+    const TemporaryFolder folder(/*in_memory=*/true);
+    auto book = ProgressBook::open(folder / "progress.sqlite");
+    ASSERT_TRUE(book);
+    ProgressEntry e = entry("Ada", 1);
+    for (const char* recording : {"", "", "a.igs.mha", "b.igs.mha", "b.igs.mha"}) {
+        e.recording = recording;
+        ASSERT_TRUE(book->add(e));
+    }
+    const auto all = book->sessions("Ada", "");
+    ASSERT_TRUE(all);
+    EXPECT_EQ(all->size(), 4u);  // b's was scored again
 }
 
 TEST(ProgressBook, ARemovedTraineeIsGoneWithFilesAndBytes) {

@@ -7,8 +7,11 @@
 #include <filesystem>
 
 #include "formats/files/load_save.h"
+#include "formats/recording/session.h"
+#include "formats/text/number_text.h"
 #include "support/paths.h"
 #include "support/random.h"
+#include "support/temporary_folder.h"
 
 namespace sonocase {
 namespace {
@@ -61,6 +64,154 @@ TEST(Poses, FaultsNameTheLine) {
     EXPECT_FALSE(parse_poses("", "p.csv"));
     EXPECT_FALSE(parse_poses("1,2,3\n", "p.csv"));
     EXPECT_TRUE(parse_poses(kHeader, "p.csv")->empty());
+}
+
+// Poses of a needle and a probe, 20 a second; the needle is lost in every seventh.
+std::vector<Pose> tool_poses(std::uint64_t seed, int lost_every) {
+    testing::Random random(seed);
+    std::vector<Pose> poses;
+    for (int i = 0; i < 60; ++i) {
+        Pose pose;
+        pose.frame = i;
+        pose.timestamp_s = 0.05 * i;
+        pose.ok = lost_every == 0 || i % lost_every != 0;
+        pose.tracker_from_tool = random.rigid(200);
+        poses.push_back(pose);
+    }
+    return poses;
+}
+
+std::string quaternion_table(const std::vector<Pose>& poses, const char* header, char between) {
+    std::string text = header;
+    for (const Pose& pose : poses) {
+        const Quaternion q = quaternion_from_rotation(pose.tracker_from_tool.rotation);
+        const Vector3 t = pose.tracker_from_tool.translation;
+        text += pose.ok ? "\nOK" : "\nMissing";
+        for (const double v : {q.w, q.x, q.y, q.z, t.x, t.y, t.z, 1000 * pose.timestamp_s})
+            text += between + number_text(v);
+    }
+    return text;
+}
+
+std::string other_cells(std::string csv, char between, bool decimal_commas) {
+    for (char& c : csv) {
+        if (c == ',') c = between;
+        if (c == '.' && decimal_commas) c = ',';
+    }
+    return csv;
+}
+
+std::string log_lines(const std::vector<Pose>& poses, const char* tool, std::size_t i) {
+    if (!poses[i].ok) return "";
+    std::string text = "  <log TimeStampSec=\"" + std::to_string(i / 20) + "\" TimeStampNSec=\"" +
+                       std::to_string(i % 20 * 50000000) + "\" type=\"transform\" DeviceName=\"" +
+                       tool + "\" transform=\"";
+    for (const double v : matrix_from_rigid(poses[i].tracker_from_tool))
+        text += number_text(v) + " ";
+    return text + "\" />\n";
+}
+
+// As 3D Slicer saves transforms: no picture, no numbers of frames, no blank after '=', no last line
+// end.
+std::string slicer_sequence(const std::vector<Pose>& probe, const std::vector<Pose>& needle) {
+    std::string text = "ObjectType = Image\nNDims = 3\nDimSize = 0 0 " +
+                       std::to_string(probe.size()) + "\nElementType = MET_UCHAR\n";
+    for (std::size_t i = 0; i < probe.size(); ++i) {
+        const std::string frame = "Seq_Frame" + std::to_string(i) + "_";
+        for (const auto& [name, pose] :
+             {std::pair("ProbeToReference", &probe[i]), {"NeedleToReference", &needle[i]}}) {
+            text += frame + name + "Transform =";
+            for (const double v : matrix_from_rigid(pose->tracker_from_tool))
+                text += number_text(v) + " ";
+            text += "\n" + frame + name + "TransformStatus = " + (pose->ok ? "OK" : "OUT_OF_VIEW") +
+                    "\n";
+        }
+        text += frame + "Timestamp = " + number_text(probe[i].timestamp_s) + "\n";
+    }
+    return text + "ElementDataFile = LOCAL";
+}
+
+TEST(Poses, OneRecordingIsTheSameInEveryForm) {
+    const std::vector<Pose> probe = tool_poses(1, 0), needle = tool_poses(2, 7);
+    const testing::TemporaryFolder folder;
+    const auto both = [&](const std::string& name, auto text) {
+        return folder.write(name + "_probe.csv", text(probe)) + "," +
+               folder.write(name + "_needle.csv", text(needle));
+    };
+    std::vector<std::string> forms;
+    forms.push_back(both("ours", format_poses));
+    forms.push_back(both("semicolon", [](const auto& poses) {
+        return other_cells(format_poses(poses), ';', false);
+    }));
+    forms.push_back(both(
+        "german", [](const auto& poses) { return other_cells(format_poses(poses), ';', true); }));
+    forms.push_back(both(
+        "tab", [](const auto& poses) { return other_cells(format_poses(poses), '\t', true); }));
+    forms.push_back(both("ndi", [](const auto& poses) {
+        return quaternion_table(poses, "State,Q0,Qx,Qy,Qz,Tx,Ty,Tz,time_ms", ',');
+    }));
+    forms.push_back(folder.write("slicer.seq.mha", slicer_sequence(probe, needle)));
+    Sequence sequence = sequence_of({{"ProbeToTracker", probe}, {"NeedleToTracker", needle}});
+    const auto written = write_sequence(sequence, SequenceForm::mha);
+    forms.push_back(folder.write("igsio.igs.mha",
+                                 {reinterpret_cast<const char*>(written.data()), written.size()}));
+    // The same header with its pixels in another file.
+    std::string header(reinterpret_cast<const char*>(written.data()), written.size());
+    const std::size_t end = header.find("LOCAL\n");
+    folder.write("apart.raw", header.substr(end + 6));
+    forms.push_back(folder.write("apart.mhd", header.substr(0, end) + "apart.raw"));
+    std::string in_turn = "<TransformRecorderLog>\n", by_tool = in_turn;
+    for (std::size_t i = 0; i < probe.size(); ++i)
+        in_turn += log_lines(probe, "ProbeToRAS", i) + log_lines(needle, "NeedleToRAS", i);
+    for (std::size_t i = 0; i < probe.size(); ++i) by_tool += log_lines(needle, "NeedleToRAS", i);
+    for (std::size_t i = probe.size(); i-- > 0;) by_tool += log_lines(probe, "ProbeToRAS", i);
+    forms.push_back(folder.write("in_turn.xml", in_turn + "</TransformRecorderLog>"));
+    forms.push_back(folder.write("by_tool.xml", by_tool + "</TransformRecorderLog>"));
+    for (const std::string& form : forms) {
+        const auto read = load_recording_file(form);
+        ASSERT_TRUE(read) << read.error().message();
+        const auto session = session_from_sequence(*read, guess_names(*read), form);
+        ASSERT_TRUE(session) << session.error().message();
+        ASSERT_EQ(session->samples.size(), probe.size()) << form;
+        for (std::size_t i = 0; i < probe.size(); ++i) {
+            const SessionSample& s = session->samples[i];
+            EXPECT_NEAR(s.time_s, probe[i].timestamp_s, 1e-9) << form;
+            ASSERT_TRUE(s.probe_ok) << form << " " << i;
+            ASSERT_EQ(s.needle_ok, needle[i].ok) << form << " " << i;
+            const auto expect_same = [&](const Rigid& a, const Rigid& b) {
+                EXPECT_LT(norm(a.translation - b.translation), 1e-9) << form;
+                for (std::size_t k = 0; k < 9; ++k)
+                    EXPECT_NEAR(a.rotation.m[k], b.rotation.m[k], 1e-9) << form;
+            };
+            expect_same(s.mannequin_from_probe, probe[i].tracker_from_tool);
+            if (s.needle_ok) expect_same(s.mannequin_from_needle, needle[i].tracker_from_tool);
+        }
+    }
+}
+
+TEST(Poses, TablesThatSayTooLittleAreRefusedWithTheCure) {
+    const auto fault = [](const std::string& csv) {
+        const auto read = parse_poses(csv, "p.csv");
+        return read ? std::string() : read.error().message();
+    };
+    EXPECT_NE(fault("q0,q1,q2,q3,tx,ty,tz\n1,0,0,0,1,2,3\n").find("qw, qx, qy, qz"),
+              std::string::npos);
+    EXPECT_NE(fault("a;b;c\n1;2;3\n").find("found a;b;c"), std::string::npos);
+    EXPECT_NE(fault("1,2,3\n").find("no line that names"), std::string::npos);
+    EXPECT_NE(fault("\xFF\xFE"
+                    "f")
+                  .find("UTF-16"),
+              std::string::npos);
+    EXPECT_NE(fault("qw,qx,qy,qz,tx,ty,tz\n0.2,0,0,0,1,2,3\n").find("length"), std::string::npos);
+    EXPECT_NE(fault("qw;qx;qy;qz;tx;ty;tz\n1;0;0;0;1.234,5;2;3\n").find("not a number"),
+              std::string::npos);
+    std::string ms = "time,qw,qx,qy,qz,tx,ty,tz\n";
+    for (int i = 0; i < 20; ++i) ms += std::to_string(i * 16.7) + ",1,0,0,0,1,2,3\n";
+    EXPECT_NE(fault(ms).find("time_ms"), std::string::npos);
+    // Metres by name.
+    const auto metres = parse_poses("qw,qx,qy,qz,tx_m,ty_m,tz_m\n1,0,0,0,0.1,0.2,0.3\n", "p.csv");
+    ASSERT_TRUE(metres) << metres.error().message();
+    EXPECT_EQ((*metres)[0].tracker_from_tool.translation, (Vector3{100, 200, 300}));
 }
 
 TEST(Poses, RealRecordingsAreRead) {

@@ -61,19 +61,70 @@ TEST(Sight, OfACurvedFaceTheShadowFollowsTheScanline) {
     EXPECT_TRUE(sound_reaches(rib, probe, down(0), {9, 0, 75}, 0));
 }
 
-TEST(Sight, GelBridgesFourMillimetresOfAir) {
+// As the picture closes it: 10 mm under a flat face, 25 under a curved one.
+TEST(Sight, ContactClosesTheGapThatThePictureCloses) {
     const Rib rib;
-    EXPECT_TRUE(sound_reaches(rib, linear(), down(3), {0, 0, 40}, 0));
-    EXPECT_FALSE(sound_reaches(rib, linear(), down(8), {0, 0, 40}, 0));
+    EXPECT_TRUE(sound_reaches(rib, linear(), down(9), {0, 0, 40}, 0));
+    EXPECT_FALSE(sound_reaches(rib, linear(), down(12), {0, 0, 40}, 0));
+    Probe curved = linear();
+    curved.shape = ProbeShape::curvilinear;
+    curved.radius_mm = 60;
+    curved.field_of_view_rad = 1.1;
+    EXPECT_TRUE(sound_reaches(rib, curved, down(20), {0, 0, 60}, 0));
+    EXPECT_FALSE(sound_reaches(rib, curved, down(28), {0, 0, 60}, 0));
 }
 
-TEST(Sight, LengthInTheShadowDoesNotCount) {
+Exercise with_linear_probe() {
+    Exercise exercise;
+    exercise.probe = linear();
+    return exercise;
+}
+
+TEST(NeedleSight, LengthInTheShadowDoesNotCount) {
     const Rib rib;
-    // Across the picture at a depth of 40: 60 mm of width, 8 of them behind the rib; of the
-    // needle's points every second millimetre is tried.
-    const double seen = visible_length(rib, linear(), down(0), {-30, 0, 40}, {30, 0, 40}, 1.5, 0);
-    EXPECT_NEAR(seen, 60 - 8, 2);
-    EXPECT_DOUBLE_EQ(visible_length(rib, linear(), down(0), {-30, 0, 12}, {30, 0, 12}, 1.5, 0), 60);
+    const NeedleSight sight(&rib, with_linear_probe());
+    // Across the picture at a depth of 40: 60 mm of width, 8 of them behind the rib, of which the
+    // thin edges let sound through; of the needle's points every second millimetre is tried.
+    const double seen = sight.visible_mm(down(0), {-30, 0, 40}, {30, 0, 40}, 0);
+    EXPECT_NEAR(seen, 60 - 8, 2.1);
+    EXPECT_DOUBLE_EQ(sight.visible_mm(down(0), {-30, 0, 12}, {30, 0, 12}, 0), 60);
+    EXPECT_EQ(sight.visible_mm(down(0), {-30, 4, 12}, {30, 4, 12}, 0), 0);  // beside the plane
+}
+
+// The part of a needle that the sector cannot show is not asked for: 60 mm of width, 20 mm of way
+// to each side of it.
+TEST(NeedleSight, OnlyTheSectorIsAskedFor) {
+    const Rib rib;
+    const NeedleSight sight(&rib, with_linear_probe());
+    EXPECT_DOUBLE_EQ(sight.in_sector_mm({-50, 0, 12}, {50, 0, 12}), 60);
+    EXPECT_DOUBLE_EQ(sight.in_sector_mm({-50, 4, 12}, {50, 4, 12}), 60);  // though not in the plane
+    EXPECT_EQ(sight.in_sector_mm({-50, 0, 12}, {-40, 0, 12}), 0);
+    EXPECT_TRUE(sight.on_the_way({-40, 0, 12}, {1, 0, 0}));
+    EXPECT_FALSE(sight.on_the_way({-20, 0, 12}, {1, 0, 0}));  // there
+    EXPECT_FALSE(sight.on_the_way({-40, 4, 12}, {1, 0, 0}));  // aimed past the plane
+    EXPECT_FALSE(sight.on_the_way({40, 0, 12}, {1, 0, 0}));   // past it
+}
+
+// A thin plate of bone dims needle and tissue alike: the needle still shows.
+class Plate final : public Anatomy {
+  public:
+    bool inside(Point3 p) const override { return p.z < 0; }
+    int label(Point3 p) const override { return !inside(p) ? 0 : p.z < -20 && p.z > -22 ? 2 : 1; }
+    double exit_distance(Point3 from, Vector3 d, double reach) const override {
+        return d.z > 0 ? std::min(reach, -from.z / d.z) : reach;
+    }
+    bool knows_tissue() const override { return true; }
+    bool blocks_sound(int label) const override { return label == 2; }
+};
+
+TEST(NeedleSight, AMirrorShowsInAWeakShadowAndAnObliqueShaftDoesNot) {
+    const Plate plate;
+    const NeedleSight sight(&plate, with_linear_probe());
+    const auto shows = [&](Vector3 axis) {
+        return sight.contrast(down(0), {0, 0, 40}, axis, 20, 0) >= NeedleSight::kShownGrey;
+    };
+    EXPECT_TRUE(shows({1, 0, 0}));
+    EXPECT_FALSE(shows(normalized({1, 0, 2})));
 }
 
 // The defect as it was found: a needle wholly behind a rib scored as wholly in the image.

@@ -60,16 +60,14 @@ struct Geometry {
 struct R {
     Real t, depth, ahead;
     V tip, dir, end;
-    bool in, touches, no_go, seen, view;
-    Real plane, beam, forward_dt;
+    bool in, touches, no_go, seen, view, on_the_way;
+    Real plane, beam, sector, forward_dt;
     const SessionSample* sample;
 };
 
 std::vector<R> readings_of(const Scene& s, const Geometry& g) {
     const Exercise& e = s.exercise;
-    const Real slab =
-        std::max(e.needle.slab_mm > 0 ? e.needle.slab_mm : needle_diameter_mm(e.needle),
-                 e.probe.elevation_mm);
+    const Real slab = e.needle.slab_mm > 0 ? e.needle.slab_mm : e.probe.elevation_mm;
     std::vector<R> r;
     for (const SessionSample& sample : s.session.samples) {
         if (!sample.needle_ok) continue;
@@ -103,9 +101,15 @@ std::vector<R> readings_of(const Scene& s, const Geometry& g) {
             const Point3 t = from * narrow(q.tip);
             q.plane = t.y;
             q.view = std::abs(t.y) <= slab / 2 && in_image(e.probe, t.x, t.z);
-            if (q.in)
-                q.beam = length_in_image(e.probe, t, from * narrow(q.end),
-                                         static_cast<double>(slab / 2));
+            const double half = static_cast<double>(slab / 2);
+            q.on_the_way =
+                !in_image(e.probe, t.x, t.z) &&
+                length_in_image(e.probe, t, from * narrow(add(q.tip, q.dir, e.needle.length_mm)),
+                                half) > 0;
+            if (q.in) {
+                q.beam = length_in_image(e.probe, t, from * narrow(q.end), half);
+                q.sector = length_in_image(e.probe, t, from * narrow(q.end), 1e9);
+            }
         }
         r.push_back(q);
     }
@@ -117,7 +121,7 @@ void add_guidance(const std::vector<R>& r, Scores& m) {
     m["depth_perception_mm"] = m["path_in_tissue_mm"] = m["time_in_tissue_s"] =
         m["tissue_damage_mm2"] = 0;
     m["no_go_time_s"] = m["deepest_mm"] = m["needle_plane_distance_max_mm"] = 0;
-    Real beam = 0, inserted = 0, seconds = 0, view = 0, plane = 0, angle = 0, advance = 0,
+    Real beam = 0, sector = 0, seconds = 0, view = 0, plane = 0, angle = 0, advance = 0,
          advance_view = 0;
     for (std::size_t i = 0; i < r.size(); ++i) {
         m["deepest_mm"] = std::max(m["deepest_mm"], r[i].depth);
@@ -141,7 +145,7 @@ void add_guidance(const std::vector<R>& r, Scores& m) {
         }
         if (!r[i].seen) continue;
         beam += dt * r[i].beam;
-        inserted += dt * r[i].depth;
+        sector += dt * r[i].sector;
         seconds += dt;
         view += r[i].view ? dt : 0;
         plane += dt * std::abs(r[i].plane);
@@ -150,10 +154,10 @@ void add_guidance(const std::vector<R>& r, Scores& m) {
         const V normal = v(r[i].sample->mannequin_from_probe.rotation.column(1));
         angle += dt * std::asin(std::abs(dot3(normal, r[i].dir))) * 180 / kPi;
         const Real forward = std::max<Real>(dot3(step, r[i].dir), 0);
-        advance += forward;
+        advance += r[i].on_the_way ? 0 : forward;
         advance_view += r[i].view ? forward : 0;
     }
-    m["needle_in_beam_fraction"] = beam / inserted;
+    m["needle_in_beam_fraction"] = beam / sector;
     m["needle_in_beam_mm"] = beam / seconds;
     m["tip_in_view_fraction"] = view / seconds;
     m["tip_in_view_at_advance_fraction"] = advance_view / advance;

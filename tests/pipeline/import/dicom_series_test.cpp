@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "pipeline/import/volume/label_map.h"
+#include "pipeline/import/volume/native_volume.h"
 #include "support/temporary_folder.h"
 #include "three_boxes.h"
 
@@ -110,7 +111,7 @@ TEST_F(DicomFolder, WithASliceOfAnotherSeriesBesideItsOwnIsReadWithAWarning) {
     ASSERT_TRUE(result) << result.error().message();
     ASSERT_FALSE(result->report.warnings.empty());
     EXPECT_NE(result->report.warnings[0].find("2 DICOM series"), std::string::npos);
-    EXPECT_NE(result->report.warnings[0].find("not other.dcm"), std::string::npos);
+    EXPECT_NE(result->report.warnings[0].find("not 1 x CT from other.dcm"), std::string::npos);
     EXPECT_EQ(result->labels.grid.size.z, volume_.size.z);
 }
 
@@ -156,6 +157,80 @@ TEST_F(DicomFolder, WithASliceOffItsPlaceOrTurnedOrCutOffIsRefused) {
         folder_.write("series/" + name_of(5), whole.substr(0, whole.size() - bytes));
         expect_refused("s0005.dcm", "cut off");
     }
+}
+
+// "3" and "3.0" are one thickness.
+TEST_F(DicomFolder, WithOneThicknessWrittenInTwoWaysIsOneSeries) {
+    write_all();
+    declared_.thickness = "3.0000";
+    write(name_of(4), 4);
+    const auto result = imported();
+    ASSERT_TRUE(result) << result.error().message();
+    EXPECT_TRUE(result->report.warnings.empty() ||
+                result->report.warnings[0].find("DICOM") == std::string::npos);
+    EXPECT_EQ(result->labels.grid.size, volume_.size);
+}
+
+TEST_F(DicomFolder, WithNumbersThatAreNotFiniteIsRefused) {
+    write_all();
+    for (const char* position : {"nan\\0\\0", "0\\inf\\0", "0\\0", "a\\b\\c", "1e999\\0\\0"}) {
+        declared_.position = position;
+        write(name_of(5), 5);
+        expect_refused("s0005.dcm", "and not 3 finite numbers");
+    }
+    declared_.position = "";
+    declared_.thickness = "nan";
+    write_all();
+    expect_refused("s0000.dcm", "SliceThickness is 'nan', and not 1 finite number");
+}
+
+// A tilted gantry: slices that slide over one another.
+TEST_F(DicomFolder, ThatIsShearedIsSquaredBelowATenthOfAVoxelAndRefusedBeyond) {
+    volume_.columns(1, 2) = 0.02;  // 0.3 mm over the stack, and voxels of 4 mm
+    write_all();
+    const auto result = imported();
+    ASSERT_TRUE(result) << result.error().message();
+    EXPECT_LT(distance(result->labels.grid.origin_mm, volume_.origin + Vector3{0, 0.15, 0}), 1e-6);
+    EXPECT_NEAR(result->labels.grid.spacing_mm.z, 3, 1e-9);
+    const auto& notes = result->report.notes;
+    EXPECT_TRUE(std::any_of(notes.begin(), notes.end(), [](const Note& note) {
+        return note.name == "shear" && note.text.find("0.15 mm at either end") != std::string::npos;
+    }));
+    volume_.columns(1, 2) = 0.53;
+    write_all();
+    expect_refused("series", "sheared against their stack by 10 degrees");
+    // Moved by whole pixels: every voxel within half a pixel of where its slice lies.
+    const auto native = read_dicom(folder_ / "series", true);
+    ASSERT_TRUE(native) << native.error().message();
+    EXPECT_EQ(native->grid.size.y, volume_.size.y + 2);
+    const auto* voxels = reinterpret_cast<const std::uint16_t*>(native->bytes.data());
+    std::size_t inside = 0, n = 0;
+    for (int k = 0; k < native->grid.size.z; ++k)
+        for (int j = 0; j < native->grid.size.y; ++j)
+            for (int i = 0; i < native->grid.size.x; ++i, ++n) {
+                if (voxels[n] == 0) continue;
+                ++inside;
+                const Point3 p = native->grid.point_from_voxel({double(i), double(j), double(k)});
+                const Vector3 from = p - volume_.position(0, 0, k);
+                const int across = static_cast<int>(std::lround(from.x / 2)),
+                          down = static_cast<int>(std::lround(from.y / 4));
+                EXPECT_LE(distance(p, volume_.position(across, down, k)), 2 + 1e-9);
+                ASSERT_EQ(voxels[n], volume_.voxels[static_cast<std::size_t>(
+                                         (k * volume_.size.y + down) * volume_.size.x + across)]);
+            }
+    EXPECT_EQ(inside,
+              volume_.voxels.size() - static_cast<std::size_t>(std::count(
+                                          volume_.voxels.begin(), volume_.voxels.end(), 0)));
+}
+
+TEST_F(DicomFolder, WhoseSlicesAreThinnerThanTheyLieApartIsReadWithAWarning) {
+    declared_.thickness = "1.5";
+    write_all();
+    const auto result = imported();
+    ASSERT_TRUE(result) << result.error().message();
+    ASSERT_FALSE(result->report.warnings.empty());
+    EXPECT_NE(result->report.warnings[0].find("1.5 mm thick and lie 3 mm apart"),
+              std::string::npos);
 }
 
 // Like a large clinical export: 3,000 slices, one wrong. Reading the headers takes about a second.

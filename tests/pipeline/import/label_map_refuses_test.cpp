@@ -145,20 +145,20 @@ TEST(ImportLabelMapRefuses, MoreLabelsThanFit) {
     expect_refused(import_label_map(path), path, "255 labels");
 }
 
-// ITK refuses both before anything else is known, in words that name neither.
-TEST(ImportLabelMapRefuses, NiftiInMetresOrWithSlantedAxesAndSaysWhatToDo) {
+TEST(ImportLabelMapRefuses, SlantedAxesAndSaysWhatToDo) {
     const TemporaryFolder folder;
-    TinyVolume metres = ras_volume(), slanted = ras_volume();
-    for (int row = 0; row < 3; ++row) {
-        for (int column = 0; column < 3; ++column) metres.columns(row, column) *= 0.001;
-        metres.origin[row] *= 0.001;
-    }
+    TinyVolume slanted = ras_volume();
     slanted.columns(1, 2) = 0.3 * slanted.columns(2, 2);  // the tilt of a gantry
-    for (const TinyVolume& volume : {metres, slanted}) {
-        const std::string path = folder.write("a.nii", testing::nifti_bytes(volume));
+    for (const auto& [name, bytes] : {std::pair{"a.nii", testing::nifti_bytes(slanted)},
+                                      {"a.nrrd", testing::nrrd_bytes(slanted)},
+                                      {"a.mha", testing::mha_bytes(slanted)}}) {
+        const std::string path = folder.write(name, bytes);
         const auto imported = import_label_map(path);
-        expect_refused(imported, path, "not at right angles, or are not in millimetres");
-        EXPECT_NE(imported.error().expected.find("resample"), std::string::npos);
+        expect_refused(imported, path, "not at right angles");
+        EXPECT_NE(imported.error().expected.find("--resample-shear"), std::string::npos);
+        ImportOptions options;  // the advice works
+        options.reading.resample_shear = true;
+        EXPECT_TRUE(import_label_map(path, options).has_value()) << name;
     }
 }
 
@@ -170,15 +170,20 @@ TEST(ImportLabelMapRefuses, TorsoInMetresOrMicrometresAndNamesTheFactor) {
             for (int column = 0; column < 3; ++column) volume.columns(row, column) *= unit * 4;
             volume.origin[row] *= unit * 4;
         }
-        const std::string path = folder.write("a.nrrd", testing::nrrd_bytes(volume));
-        const auto imported = import_label_map(path);
-        expect_refused(imported, path, "body is");
-        EXPECT_NE(imported.error().expected.find(std::string("--scale ") + factor),
-                  std::string::npos)
-            << imported.error().message();
-        ImportOptions options;
-        options.scale = 1 / unit;
-        EXPECT_TRUE(import_label_map(path, options).has_value());
+        for (const auto& [name, bytes] : {std::pair{"a.nrrd", testing::nrrd_bytes(volume)},
+                                          {"a.nii", testing::nifti_bytes(volume)},
+                                          {"a.mha", testing::mha_bytes(volume)}}) {
+            const std::string path = folder.write(name, bytes);
+            const auto imported = import_label_map(path);
+            expect_refused(imported, path, "body is");
+            EXPECT_NE(imported.error().expected.find(std::string("--scale ") + factor),
+                      std::string::npos)
+                << imported.error().message();
+            ImportOptions options;
+            options.scale = 1 / unit;
+            options.names = "none";  // the boxes are no organs
+            EXPECT_TRUE(import_label_map(path, options).has_value());
+        }
     }
 }
 

@@ -4,6 +4,7 @@
 
 #include <zlib.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <sstream>
@@ -55,6 +56,73 @@ std::string us(std::uint16_t value) {
     std::string bytes(2, '\0');
     put(bytes, 0, value);
     return bytes;
+}
+
+std::string item(const std::string& content) {
+    std::string bytes("\xfe\xff\x00\xe0\0\0\0\0", 8);
+    put(bytes, 4, static_cast<std::uint32_t>(content.size()));
+    return bytes + content;
+}
+
+std::string sequence(std::uint16_t group, std::uint16_t number, const std::string& content) {
+    return element(group, number, "SQ", item(content));
+}
+
+// Preamble and file meta information.
+std::string dicom_head(const std::string& type,
+                       const std::string& instance,
+                       const std::string& syntax = "1.2.840.10008.1.2.1") {
+    const std::string meta = element(2, 1, "OB", std::string("\0\1", 2)) +
+                             element(2, 2, "UI", type) + element(2, 3, "UI", instance) +
+                             element(2, 0x10, "UI", syntax) + element(2, 0x12, "UI", "1.2.3.4");
+    std::string length(4, '\0');
+    put(length, 0, static_cast<std::uint32_t>(meta.size()));
+    return std::string(128, '\0') + "DICM" + element(2, 0, "UL", length) + meta;
+}
+
+// A frame as run lengths: repeats of three and more, and what lies between as it is.
+std::string run_lengths(const std::string& frame, std::size_t planes) {
+    std::string head(64, '\0'), body;
+    put(head, 0, static_cast<std::uint32_t>(planes));
+    for (std::size_t plane = 0; plane < planes; ++plane) {
+        put(head, 4 + 4 * plane, static_cast<std::uint32_t>(64 + body.size()));
+        std::string bytes;
+        for (std::size_t n = planes - 1 - plane; n < frame.size(); n += planes) bytes += frame[n];
+        for (std::size_t n = 0; n < bytes.size();) {
+            std::size_t same = 1;
+            while (n + same < bytes.size() && same < 128 && bytes[n + same] == bytes[n]) ++same;
+            if (same > 2) {
+                body += static_cast<char>(1 - static_cast<int>(same));
+                body += bytes[n];
+            } else {
+                body += static_cast<char>(same - 1);
+                body += bytes.substr(n, same);
+            }
+            n += same;
+        }
+    }
+    return head + body;
+}
+
+std::string deflated(const std::string& frame) {
+    z_stream stream{};
+    deflateInit2(&stream, 6, Z_DEFLATED, -15, 8, Z_DEFAULT_STRATEGY);
+    std::string out(deflateBound(&stream, frame.size()), '\0');
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(frame.data()));
+    stream.avail_in = static_cast<uInt>(frame.size());
+    stream.next_out = reinterpret_cast<Bytef*>(out.data());
+    stream.avail_out = static_cast<uInt>(out.size());
+    deflate(&stream, Z_FINISH);
+    out.resize(stream.total_out);
+    deflateEnd(&stream);
+    return out;
+}
+
+std::string orientation(const TinyVolume& volume) {
+    const Vector3 x = volume.columns.column(0), y = volume.columns.column(1);
+    const double sx = norm(x), sy = norm(y);
+    return element(0x20, 0x37, "DS",
+                   numbers({-x.x / sx, -x.y / sx, x.z / sx, -y.x / sy, -y.y / sy, y.z / sy}, "\\"));
 }
 
 }  // namespace
@@ -204,27 +272,22 @@ std::string dicom_slice(const TinyVolume& volume,
                         const DicomCounts& counts) {
     const std::string instance = series + "." + std::to_string(k + 1);
     const std::string ct = "1.2.840.10008.5.1.4.1.1.2";
-    std::string meta = element(2, 1, "OB", std::string("\0\1", 2)) + element(2, 2, "UI", ct) +
-                       element(2, 3, "UI", instance) +
-                       element(2, 0x10, "UI", "1.2.840.10008.1.2.1") +
-                       element(2, 0x12, "UI", "1.2.3.4");
-    std::string length(4, '\0');
-    put(length, 0, static_cast<std::uint32_t>(meta.size()));
-    std::string bytes(128, '\0');
-    bytes += "DICM" + element(2, 0, "UL", length) + meta;
+    std::string bytes = dicom_head(ct, instance);
     const Vector3 x = volume.columns.column(0), y = volume.columns.column(1);
     Point3 at = volume.position(0, 0, k);
     if (counts.round_to_mm > 0) at.z = std::round(at.z / counts.round_to_mm) * counts.round_to_mm;
     const double sx = norm(x), sy = norm(y);
     bytes += element(8, 0x16, "UI", ct) + element(8, 0x18, "UI", instance) +
              element(8, 0x60, "CS", "CT");
-    bytes += element(0x18, 0x50, "DS", numbers({norm(volume.columns.column(2))}, ""));
+    bytes += element(0x18, 0x50, "DS",
+                     !counts.thickness.empty() ? counts.thickness
+                                               : numbers({norm(volume.columns.column(2))}, ""));
     bytes += element(0x20, 0xd, "UI", "1.2.3.9") + element(0x20, 0xe, "UI", series);
     bytes += element(0x20, 0x13, "IS", std::to_string(k + 1));
-    bytes += element(0x20, 0x32, "DS", numbers({-at.x, -at.y, at.z}, "\\"));
     bytes +=
-        element(0x20, 0x37, "DS",
-                numbers({-x.x / sx, -x.y / sx, x.z / sx, -y.x / sy, -y.y / sy, y.z / sy}, "\\"));
+        element(0x20, 0x32, "DS",
+                !counts.position.empty() ? counts.position : numbers({-at.x, -at.y, at.z}, "\\"));
+    bytes += orientation(volume);
     if (counts.in_acquisition > 0)
         bytes += element(0x20, 0x1002, "IS", std::to_string(counts.in_acquisition));
     if (counts.in_series > 0)
@@ -239,6 +302,151 @@ std::string dicom_slice(const TinyVolume& volume,
     const std::size_t slice = static_cast<std::size_t>(volume.size.x) * volume.size.y;
     for (std::size_t n = 0; n < slice; ++n) pixels += us(volume.voxels[k * slice + n]);
     return bytes + element(0x7fe0, 0x10, "OW", pixels);
+}
+
+std::string dicom_object(const TinyVolume& volume, const TinyObject& object) {
+    const bool scan = object.kind == "CT", labelmap = object.kind == "LABELMAP";
+    const std::string base = "1.2.840.10008.5.1.4.1.1.";
+    const std::string type = base + (scan ? "2.1" : labelmap ? "66.7" : "66.4");
+    const bool lengths = object.packing == "run lengths";
+    std::string bytes = dicom_head(type, "1.2.3.8.1",
+                                   object.packing.empty() ? "1.2.840.10008.1.2.1"
+                                   : lengths              ? "1.2.840.10008.1.2.5"
+                                                          : "1.2.840.10008.1.2.8.1");
+    bytes += element(8, 0x16, "UI", type) + element(8, 0x18, "UI", "1.2.3.8.1");
+    bytes += element(8, 0x60, "CS",
+                     !object.modality.empty() ? object.modality
+                     : scan                   ? "CT"
+                                              : "SEG");
+    std::string measures;
+    if (object.thickness_mm != 0)
+        measures += element(0x18, 0x50, "DS", numbers({object.thickness_mm}, ""));
+    if (object.between_mm != 0)
+        measures += element(0x18, 0x88, "DS", numbers({object.between_mm}, ""));
+    const std::string spacing =
+        element(0x28, 0x30, "DS",
+                numbers({norm(volume.columns.column(1)), norm(volume.columns.column(0))}, "\\"));
+    const auto position = [&](int k) {
+        const Point3 at = volume.position(0, 0, k);
+        return element(0x20, 0x32, "DS", numbers({-at.x, -at.y, at.z}, "\\"));
+    };
+    if (object.placed_by_header) bytes += measures;
+    bytes += element(0x20, 0xd, "UI", "1.2.3.9") + element(0x20, 0xe, "UI", "1.2.3.8");
+    if (object.placed_by_header) bytes += position(0) + orientation(volume);
+    bytes += element(0x20, 0x52, "UI", object.frame_of_reference);
+
+    // The frames, each with its groups.
+    const std::size_t slice = static_cast<std::size_t>(volume.size.x) * volume.size.y;
+    std::vector<std::pair<int, int>> frames;  // segment, slice
+    for (int s = 0; s < (scan || labelmap ? 1 : static_cast<int>(object.segments.size())); ++s)
+        for (int k = 0; k < volume.size.z; ++k) frames.emplace_back(s, k);
+    const auto inside = [&](const TinySegment& segment, std::uint8_t value) {
+        return std::find(segment.values.begin(), segment.values.end(), value) !=
+               segment.values.end();
+    };
+    const auto pixel = [&](int s, std::size_t n) {
+        const std::uint8_t value = volume.voxels[n];
+        if (scan) return int(value);
+        if (!labelmap) return int(inside(object.segments[static_cast<std::size_t>(s)], value));
+        for (const TinySegment& segment : object.segments)
+            if (inside(segment, value)) return segment.number;
+        return 0;
+    };
+    std::erase_if(frames, [&](std::pair<int, int> frame) {
+        const auto [s, k] = frame;
+        if (std::count(object.without.begin(), object.without.end(), k) > 0) return true;
+        bool any = scan || object.all_frames;
+        for (std::size_t n = k * slice; n < (k + 1) * slice; ++n) any = any || pixel(s, n) != 0;
+        return !any;
+    });
+    if (object.reversed) std::reverse(frames.begin(), frames.end());
+    const auto packed_bits = [](const std::string& bits) {
+        std::string out;
+        for (std::size_t n = 0; n < bits.size(); n += 8) {
+            int byte = 0;
+            for (std::size_t b = n; b < std::min(n + 8, bits.size()); ++b)
+                if (bits[b] == '1') byte |= 1 << (b - n);
+            out += static_cast<char>(byte);
+        }
+        return out;
+    };
+    std::string groups, bits, pixels, fragments = item("");
+    bool first = true;
+    for (const auto& [s, k] : frames) {
+        std::string group;
+        if (!object.placed_by_header)
+            group += sequence(0x20, 0x9113,
+                              first && !object.first_position.empty()
+                                  ? element(0x20, 0x32, "DS", object.first_position)
+                                  : position(k));
+        if (!scan && !labelmap)
+            group += sequence(0x62, 0xa,
+                              element(0x62, 0xb, "US",
+                                      us(static_cast<std::uint16_t>(
+                                          object.segments[static_cast<std::size_t>(s)].number))));
+        groups += item(group);
+        first = false;
+        for (std::size_t n = k * slice; n < (k + 1) * slice; ++n) {
+            const int value = pixel(s, n);
+            if (object.kind == "BINARY")
+                bits += value != 0 ? '1' : '0';
+            else if (object.kind == "FRACTIONAL")
+                pixels += static_cast<char>(value != 0 ? object.inside : object.outside);
+            else if (scan || object.bits == 16)
+                pixels += us(static_cast<std::uint16_t>(value));
+            else
+                pixels += static_cast<char>(value);
+        }
+        if (object.packing.empty()) continue;
+        const std::string one = pixels + packed_bits(bits);
+        std::string fragment =
+            lengths ? run_lengths(one, labelmap && object.bits == 16 ? 2 : 1) : deflated(one);
+        if (fragment.size() % 2) fragment += '\0';
+        fragments += item(fragment);
+        pixels.clear();
+        bits.clear();
+    }
+    pixels += packed_bits(bits);
+    const std::uint16_t allocated = scan || (labelmap && object.bits == 16) ? 16
+                                    : object.kind == "BINARY"               ? 1
+                                                                            : 8;
+    bytes += element(0x28, 2, "US", us(1)) + element(0x28, 4, "CS", "MONOCHROME2");
+    bytes += element(0x28, 8, "IS", std::to_string(frames.size()));
+    bytes += element(0x28, 0x10, "US", us(static_cast<std::uint16_t>(volume.size.y))) +
+             element(0x28, 0x11, "US", us(static_cast<std::uint16_t>(volume.size.x)));
+    if (object.placed_by_header) bytes += spacing;
+    bytes += element(0x28, 0x100, "US", us(allocated)) + element(0x28, 0x101, "US", us(allocated)) +
+             element(0x28, 0x102, "US", us(static_cast<std::uint16_t>(allocated - 1))) +
+             element(0x28, 0x103, "US", us(0));
+    if (!scan) {
+        bytes += element(0x62, 1, "CS", object.kind);
+        std::string segments;
+        for (const TinySegment& segment : object.segments) {
+            std::string content =
+                element(0x62, 4, "US", us(static_cast<std::uint16_t>(segment.number))) +
+                element(0x62, 5, "LO", segment.label);
+            if (!segment.meaning.empty())
+                content +=
+                    sequence(0x62, 0xf,
+                             element(8, 0x100, "SH", "10200004") + element(8, 0x102, "SH", "SCT") +
+                                 element(8, 0x104, "LO", segment.meaning));
+            segments += item(content);
+        }
+        bytes += element(0x62, 2, "SQ", segments);
+        if (object.kind == "FRACTIONAL")
+            bytes += element(0x62, 0xe, "US", us(static_cast<std::uint16_t>(object.maximum))) +
+                     element(0x62, 0x10, "CS", "PROBABILITY");
+    }
+    if (!object.placed_by_header) {
+        bytes += sequence(0x5200, 0x9229,
+                          sequence(0x20, 0x9116, orientation(volume)) +
+                              sequence(0x28, 0x9110, measures + spacing));
+        bytes += element(0x5200, 0x9230, "SQ", groups);
+    }
+    if (object.packing.empty()) return bytes + element(0x7fe0, 0x10, scan ? "OW" : "OB", pixels);
+    std::string end("\xfe\xff\xdd\xe0\0\0\0\0", 8), start = element(0x7fe0, 0x10, "OB", "");
+    put(start, 8, std::uint32_t{0xffffffff});
+    return bytes + start + fragments + end;
 }
 
 }  // namespace sonocase::testing

@@ -53,11 +53,36 @@ std::string gzip_bytes(const std::string& bytes);
 struct DicomCounts {
     int in_acquisition = 0, in_series = 0;  // number of slices; 0: not given
     double round_to_mm = 0;                 // rounding of the position; 0: none
+    std::string position, thickness;        // texts instead of the true ones
 };
 // One slice of an uncompressed DICOM series of unsigned 16-bit values, explicit little-endian.
 std::string dicom_slice(const TinyVolume& volume,
                         int k,
                         const std::string& series,
                         const DicomCounts& counts = {});
+
+// A multi-frame DICOM object of the volume, explicit little-endian.
+struct TinySegment {
+    int number = 1;
+    std::string label;
+    std::vector<int> values;  // of the volume that are inside
+    std::string meaning;      // of its type's code; empty: none
+};
+struct TinyObject {
+    std::string kind = "BINARY";  // FRACTIONAL, LABELMAP, or CT: its pixels are the values
+    std::vector<TinySegment> segments;
+    int bits = 8;                                  // of LABELMAP
+    int inside = 255, outside = 0, maximum = 255;  // of FRACTIONAL
+    bool reversed = false;                         // the frames run from the last to the first
+    bool all_frames = false;                       // also those without a voxel inside
+    std::vector<int> without;                      // slices that have no frame
+    double between_mm = 0, thickness_mm = 0;       // 0: none
+    std::string first_position;                    // instead of the first frame's own
+    bool placed_by_header = false;                 // CT: by the elements of a single slice
+    std::string modality;                          // empty: by the kind
+    std::string packing;                           // "run lengths", "deflate"; empty: none
+    std::string frame_of_reference = "1.2.3.7";
+};
+std::string dicom_object(const TinyVolume& volume, const TinyObject& object);
 
 }  // namespace sonocase::testing

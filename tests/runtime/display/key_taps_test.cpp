@@ -29,6 +29,37 @@ TEST(KeyTaps, AKeyThatIsHeldStaysDown) {
     EXPECT_TRUE(down[1]);
 }
 
+// Two presses between two pictures, and one more while the first is shown.
+TEST(KeyTaps, EveryPressGoesDownInAPictureOfItsOwn) {
+    KeyTaps<4> taps;
+    taps.press(3);
+    taps.press(3);
+    int presses = 0;
+    bool before = false;
+    for (int picture = 0; picture < 8; ++picture) {
+        if (picture == 1) taps.press(3);
+        bool down[4] = {};
+        taps.hold(down);
+        presses += down[3] && !before;
+        before = down[3];
+        taps.release(down);
+        EXPECT_FALSE(down[3]);
+    }
+    EXPECT_EQ(presses, 3);
+    EXPECT_FALSE(taps.waiting());
+}
+
+// Shift + V as one tap: Shift is up again when the picture begins.
+TEST(KeyTaps, ModifiersGoWithTheirPress) {
+    KeyTaps<4> taps;
+    bool down[4] = {};
+    taps.press(1, 5);
+    EXPECT_TRUE(taps.waiting());
+    EXPECT_EQ(taps.hold(down), 5);
+    taps.release(down);
+    EXPECT_EQ(taps.hold(down), 0);
+}
+
 TEST(KeyTaps, UnknownKeysAreLeftOut) {
     KeyTaps<4> taps;
     bool down[4] = {};

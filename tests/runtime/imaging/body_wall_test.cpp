@@ -72,7 +72,7 @@ TEST(TissueLayers, FatInsideAnOrganIsNoWall) {
 }
 
 TEST(BodyWall, ASheetsEchoIsItsOwnTimesTheFourthPowerOfTheCosine) {
-    // The peritoneum alone: 1.4 mm above the organs, 17 dB.
+    // The peritoneum alone: 1.4 mm above the organs, 11 dB.
     const auto peak = [](double angle) {
         const CaseBundle bundle = plane_wall(1, angle);
         BlockBench b(bundle, block_exercise());
@@ -94,7 +94,7 @@ TEST(BodyWall, ASheetsEchoIsItsOwnTimesTheFourthPowerOfTheCosine) {
     };
     const double straight = peak(0);
     // The slope of the distances is good to 5 %, its fourth power to 1.8 dB; that of two to 3.5 dB.
-    EXPECT_NEAR(20 * std::log10(straight), 14, 1.8);
+    EXPECT_NEAR(20 * std::log10(straight), 11, 1.8);
     for (const double angle : {0.3, 0.5}) {
         const double expected = 4 * 20 * std::log10(std::cos(angle));
         EXPECT_NEAR(20 * std::log10(peak(angle) / straight), expected, 3.5) << angle;

@@ -295,5 +295,48 @@ TEST(MachineInTheRenderer, AMeasuredTissueTakesItsLevel) {
     EXPECT_GT(mean_of(draw(phantom_exercise(), options_of(machine), {})), 1.3 * plain);
 }
 
+// Liver under 2 mm of skin alone, and under 20 mm of fat and muscle besides.
+TEST(OpeningGain, APictureOpensInTheMiddleOfItsGreyThroughAnyWall) {
+    for (const bool layers : {false, true}) {
+        sonocase::testing::PhantomOptions o;
+        o.ribs = o.gas = o.vessels = o.kidney = false;
+        o.layers = layers;
+        o.voxel_mm = 2;
+        const CaseBundle bundle = Phantom(o).bundle();
+        Exercise exercise = phantom_exercise();
+        exercise.start_beam = {0, 0, 1};  // the script's place, or the start: on the skin
+        for (const std::string& name : machine_names()) {
+            RenderOptions options = options_of(*built_in_machine(name));
+            options.scanlines = options.samples = 0;
+            options.width_px = options.height_px = 256;
+            const auto pixels = draw(exercise, options, {}, bundle);
+            double sum = 0, n = 0, deep = 0, deep_n = 0;
+            for (int y = 30; y < 250; ++y) {
+                for (int x = 256 / 3; x < 2 * 256 / 3; ++x) {
+                    const double grey = pixels[static_cast<std::size_t>(256 * y + x)];
+                    if (grey < 30) continue;
+                    sum += grey;
+                    n += 1;
+                    if (y < 190) continue;
+                    deep += grey;
+                    deep_n += 1;
+                }
+            }
+            std::printf("%s, %s: %.0f, far away %.0f\n", name.c_str(),
+                        layers ? "thick wall" : "thin wall", sum / n, deep / deep_n);
+            EXPECT_NEAR(sum / n, 95, 15) << name << layers;
+            EXPECT_NEAR(deep / deep_n, 95, 35) << name << layers;
+        }
+    }
+}
+
+// Where the exercise's place is not on the body there is nothing to go by.
+TEST(OpeningGain, AwayFromTheBodyItIsNone) {
+    Exercise exercise = phantom_exercise();
+    exercise.start_probe = {0, 0, -500};
+    EXPECT_TRUE(draw(exercise, options_of(Machine{}), {}) ==
+                draw(phantom_exercise(), options_of(Machine{}), {}));
+}
+
 }  // namespace
 }  // namespace sonocase::runtime

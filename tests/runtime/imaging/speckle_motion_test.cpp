@@ -65,10 +65,13 @@ Plane detail_of(const std::vector<std::uint8_t>& pixels) {
 
 class Sweep {
   public:
-    explicit Sweep(RenderOptions options = {}, Exercise exercise = sweep_exercise()) {
+    explicit Sweep(RenderOptions options = {},
+                   Exercise exercise = sweep_exercise(),
+                   const CaseBundle& bundle = liver()) {
         options.width_px = kWidth;
         options.height_px = kHeight;
-        renderer_.emplace(std::move(*Renderer::create(liver(), exercise, options)));
+        probe_ = exercise.probe;
+        renderer_.emplace(std::move(*Renderer::create(bundle, exercise, options)));
         pixels_.resize(kWidth * kHeight);
     }
     Plane detail(const Rigid& pose, double time_s = 0, std::uint32_t frame = 0) {
@@ -81,8 +84,9 @@ class Sweep {
     }
     const std::vector<std::uint8_t>& pixels() const { return pixels_; }
     // Mean of the best correlation of each patch whose middle lies so deep, the shift in the plane
-    // searched.
-    double correlation(const Plane& a, const Plane& b, double from_mm, double to_mm) const {
+    // searched about how far the probe moved along its face.
+    double correlation(
+        const Plane& a, const Plane& b, double from_mm, double to_mm, double moved_mm = 0) const {
         const auto layout = renderer_->layout();
         double sum = 0;
         int n = 0;
@@ -90,17 +94,24 @@ class Sweep {
             const double z = (y + kPatch / 2 - layout.origin_y_px) * layout.mm_per_px;
             for (int x = kPatch; x + 2 * kPatch < kWidth; x += kPatch) {
                 const double across = (x + kPatch / 2 - layout.origin_x_px) * layout.mm_per_px;
-                const double r = std::hypot(across, z + 50.6) - 50.6;
-                if (r < from_mm || r > to_mm || std::abs(across) > 0.35 * (z + 50.6)) continue;
-                sum += best_of(a, b, x, y);
+                if (!within(across, z, from_mm, to_mm)) continue;
+                sum += best_of(a, b, x, y, static_cast<int>(moved_mm / layout.mm_per_px));
                 ++n;
             }
         }
+        EXPECT_GT(n, 0);
         return sum / n;
     }
 
   private:
-    static double best_of(const Plane& a, const Plane& b, int x, int y) {
+    bool within(double across, double z, double from_mm, double to_mm) const {
+        if (probe_.shape == ProbeShape::linear)
+            return z >= from_mm && z <= to_mm && std::abs(across) < 0.35 * probe_.width_mm;
+        const double radius = probe_.shape == ProbeShape::phased ? 0 : probe_.radius_mm;
+        const double r = std::hypot(across, z + radius) - radius;
+        return r >= from_mm && r <= to_mm && std::abs(across) <= 0.35 * (z + radius);
+    }
+    static double best_of(const Plane& a, const Plane& b, int x, int y, int moved_px) {
         constexpr double n = kPatch * kPatch;
         const auto at = [](const Plane& of, int column, int row) {
             return of.data() + row * kWidth + column;
@@ -123,7 +134,7 @@ class Sweep {
         const double sa = sum_of(first), aa = product_of(first, first);
         double best = -1;
         for (int dy = -4; dy <= 4; ++dy) {
-            for (int dx = -4; dx <= 4; ++dx) {
+            for (int dx = -4 - moved_px; dx <= 4 - moved_px; ++dx) {
                 const double* second = at(b, x + dx, y + dy);
                 const double sb = sum_of(second), bb = product_of(second, second);
                 best = std::max(best, (product_of(first, second) - sa * sb / n) /
@@ -133,6 +144,7 @@ class Sweep {
         return best;
     }
 
+    Probe probe_;
     std::optional<Renderer> renderer_;
     std::vector<std::uint8_t> pixels_;
 };
@@ -186,6 +198,41 @@ TEST(SpeckleMotion, AlongTheFaceAndInDepthAFractionOfABeamKeepsIt) {
             std::printf("%.2f mm along the face, %.2f in depth: %.2f\n", limit.by_mm.x,
                         limit.by_mm.z, c);
             EXPECT_GE(c, limit.least);
+        }
+    }
+}
+
+// The deeper a picture reaches, the farther apart its beams are at its lower edge: there a fan once
+// skipped scatterers. A picture ends 20 mm below the depth that is looked at.
+TEST(SpeckleMotion, AtEveryDepthOfEveryProbeItMovesAlongTheFace) {
+    const CaseBundle deep = liver_alone({-150, -12, -25}, {150, 12, 275}, 2.5);
+    const struct {
+        const char* name;
+        ProbeShape shape;
+        double frequency_mhz;
+    } probes[] = {{"curved", ProbeShape::curvilinear, 3.5},
+                  {"linear", ProbeShape::linear, 7.5},
+                  {"phased", ProbeShape::phased, 2.5}};
+    const struct {
+        double mm, least;
+    } limits[] = {{0.2, 0.85}, {0.4, 0.80}, {0.6, 0.75}, {1.0, 0.65}};
+    for (const auto& probe : probes) {
+        for (const double depth : {60.0, 90.0, 120.0, 180.0, 240.0}) {
+            Exercise exercise = sweep_exercise();
+            exercise.probe.shape = probe.shape;
+            exercise.probe.frequency_mhz = probe.frequency_mhz;
+            exercise.probe.depth_mm = depth + 20;
+            if (probe.shape == ProbeShape::phased) exercise.probe.field_of_view_rad = 1.5;
+            Sweep sweep({}, exercise, deep);
+            const Plane still = sweep.detail({});
+            std::printf("%s, %3.0f mm:", probe.name, depth);
+            for (const auto& limit : limits) {
+                const double c = sweep.correlation(still, sweep.detail(moved({}, {limit.mm, 0, 0})),
+                                                   depth - 12, depth + 12);
+                std::printf(" %.2f", c);
+                EXPECT_GE(c, limit.least) << probe.name << ", " << depth << " mm";
+            }
+            std::printf("\n");
         }
     }
 }

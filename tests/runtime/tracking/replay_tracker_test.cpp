@@ -65,6 +65,65 @@ TEST(ReplayTracker, ACalibratedLagBringsTheNeedleToItsOwnMoment) {
     }
 }
 
+std::string table(int rows, double start_s, double scale, double fall_at = -1) {
+    std::string text = "frame,timestamp_s,status,tx,ty,tz,r00,r01,r02,r10,r11,r12,r20,r21,r22\n";
+    for (int i = 0; i < rows; ++i) {
+        const double t = start_s + 0.05 * i - (i == fall_at ? 1 : 0);
+        text += std::to_string(i) + "," + std::to_string(t) + ",OK," +
+                std::to_string(scale * (100 + i)) + ",0,0,1,0,0,0,1,0,0,0,1\n";
+    }
+    return text;
+}
+
+TEST(ReplayTracker, TwoClocksAreRefusedUnlessTheirLagIsKnown) {
+    const sonocase::testing::TemporaryFolder folder;
+    const std::string probe = folder.write("probe.csv", table(100, 0, 1)),
+                      needle = folder.write("needle.csv", table(100, 1.7e9, 1));
+    const auto refused = load_recording(probe + "," + needle);
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().message().find("one clock"), std::string::npos);
+    const auto tied = load_recording(probe + "," + needle, 1.7e9);
+    ASSERT_TRUE(tied) << tied.error().message();
+    ReplayTracker replay(*tied, false);
+    TrackerReading reading;
+    ASSERT_TRUE(replay.poll(0, reading));
+    ASSERT_TRUE(replay.poll(2, reading));
+    EXPECT_EQ(reading.sensors[kNeedleSensor].state, SensorState::ok);
+    EXPECT_EQ(reading.sensors[kNeedleSensor].world_from_sensor.translation.x, 140);
+}
+
+TEST(ReplayTracker, ANeedleThatBeginsLaterIsLostUntilThen) {
+    const sonocase::testing::TemporaryFolder folder;
+    const std::string probe = folder.write("probe.csv", table(100, 0, 1)),
+                      needle = folder.write("needle.csv", table(100, 3, 1));
+    const auto recording = load_recording(probe + "," + needle);
+    ASSERT_TRUE(recording) << recording.error().message();
+    ReplayTracker replay(*recording, false);
+    TrackerReading reading;
+    for (int i = 0; i < 100; ++i) {
+        ASSERT_TRUE(replay.poll(replay.recorded_time_s(i), reading));
+        EXPECT_EQ(reading.sensors[kProbeSensor].state, SensorState::ok);
+        // Within one step of the recording.
+        if (i < 59) EXPECT_EQ(reading.sensors[kNeedleSensor].state, SensorState::lost) << i;
+        if (i >= 60) EXPECT_EQ(reading.sensors[kNeedleSensor].state, SensorState::ok) << i;
+    }
+}
+
+TEST(ReplayTracker, SaysWhatItLeavesOutAndRefusesMetresAndNoTimes) {
+    const sonocase::testing::TemporaryFolder folder;
+    const auto falling = load_recording(folder.write("f.csv", table(50, 0, 1, 30)));
+    ASSERT_TRUE(falling) << falling.error().message();
+    EXPECT_EQ(falling->probe.size(), 49u);
+    EXPECT_NE(falling->note.find("1 of 50 readings were left out"), std::string::npos);
+    const auto metres = load_recording(folder.write("m.csv", table(50, 0, 1e-3)));
+    ASSERT_FALSE(metres);
+    EXPECT_NE(metres.error().message().find("metres"), std::string::npos);
+    const auto timeless = load_recording(
+        folder.write("n.csv", "tx,ty,tz,qw,qx,qy,qz\n1,2,300,1,0,0,0\n1,2,301,1,0,0,0\n"));
+    ASSERT_FALSE(timeless);
+    EXPECT_NE(timeless.error().message().find("no times"), std::string::npos);
+}
+
 TEST(PacedTracker, RunsSlowerFasterStandsStillAndJumps) {
     PacedTracker paced(std::make_unique<ReplayTracker>(recording(101, 0.1), true));
     TrackerReading reading;

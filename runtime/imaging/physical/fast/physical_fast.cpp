@@ -580,6 +580,10 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         int k0 = 0, k1 = 0;
         if (needle && strip.prepare_block(*f.needle, g, line, keep_all, row, k0, k1)) {
             PassTimer timer(context_.clock);
+            // A beam in air shows none, though its neighbours' light spreads into it.
+            constexpr float kFarMm = 1e4f;
+            for (int v = 0; v < kBeamBlock; ++v)
+                if (gaps_[std::min(line + v, g.scanlines - 1)] < 0) row.origin_x[v] = kFarMm;
             draw_physical_needle(context_.simd, b, row, k0, k1);
             add_ms(needle_ms, timer.lap_ms());
             met.needle.store(true, std::memory_order_relaxed);

@@ -32,6 +32,10 @@ bool is_fat(const Tissue& t) {
     return t.name == "fat";
 }
 
+// Fat between organs is as bright as they are, that under the skin darker (both assumed); dark, it
+// reads as fluid.
+constexpr double kVisceralFatDb = 6;
+
 bool is_parenchyma(const Tissue& t) {
     return t.name == "liver" || t.name == "spleen" || t.name == "kidney_cortex";
 }
@@ -73,9 +77,12 @@ PairEcho pair_echo(const Label& la, const Tissue& a, const Label& lb, const Tiss
         e.sigma_mm = 0.128;
         e.split_mm = 0.375;
     }
+    // Cortical bone is the brightest arc of a picture.
+    constexpr double kMaxOfBone = 0.2;
+    const bool bone = a.kind == TissueKind::bone || b.kind == TissueKind::bone;
     if (reflection > 1e-4) {
-        e.amplitude =
-            kInterfaceGain * std::pow(std::min(reflection, kMaxReflection), kInterfacePower);
+        const double most = bone ? kMaxOfBone : kMaxReflection;
+        e.amplitude = kInterfaceGain * std::pow(std::min(reflection, most), kInterfacePower);
     }
     return e;
 }
@@ -118,7 +125,7 @@ TargetTissue tissue_of_target(TargetLook look) {
         case TargetLook::none:
         case TargetLook::lesion: break;
         case TargetLook::marker: return {{12, 0.5, TissueKind::soft}, 12};
-        case TargetLook::abscess: return {{-17, 0.2, TissueKind::fluid}, 4};
+        case TargetLook::abscess: return {{-30, 0.2, TissueKind::fluid}, 2};
         case TargetLook::cyst:
         case TargetLook::calyx: return {{-58, 0.02, TissueKind::fluid}, 3};
     }
@@ -179,7 +186,9 @@ void add_tissues(const CaseBundle& bundle,
     for (std::size_t l = 0; l < count; ++l) {
         const Tissue& t = tissue(l);
         const auto measured = options.tissue_db.find(bundle.labels[l].name);
-        s.acoustics.push_back({measured != options.tissue_db.end() ? measured->second : t.echo_db,
+        double echo_db = t.echo_db;
+        if (is_fat(t) && contains(bundle.labels[l].name, "visceral")) echo_db += kVisceralFatDb;
+        s.acoustics.push_back({measured != options.tissue_db.end() ? measured->second : echo_db,
                                t.attenuation_db_cm_mhz, l == 0 ? TissueKind::outside : t.kind,
                                t.name == "skin"  ? kWallSkinDb
                                : t.name == "fat" ? kWallFatDb

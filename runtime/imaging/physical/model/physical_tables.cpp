@@ -16,7 +16,12 @@ constexpr double kLayerMm = 0.18;      // typical deviation of a reflecting laye
 constexpr double kPhaseLoss = 0.75;    // measured on the rough face of bone
 constexpr double kCellMm = 0.66;       // edge of the scatterers' lattice at 3.5 MHz
 constexpr double kCellPerStep = 1.25;  // the edge is at least this many samples long
-constexpr int kSkirtReach = 6;         // beams; what lies further out does not show
+// Beams stand no farther apart than this many edges: what lies between two beams would show in
+// neither, and speckle would not follow the tissue. Where beams are fewer, the edge grows instead,
+// and the point spread with it.
+constexpr double kMaxPitch = 1.5;
+constexpr double kCoarsest = 3;  // limit of that growth
+constexpr int kSkirtReach = 6;   // beams; what lies further out does not show
 
 // Deviation that the taps must add: the blend of the scatterers is a part of the point spread.
 double rest_of(double fwhm_mm, double cell_mm) {
@@ -116,6 +121,19 @@ double lateral_width(
     const double wavelength = 1.54 / frequency_mhz;
     return fan ? 1.05 * wavelength * std::max(2.2, r / 22) * grown(probe.focus_mm, 70)
                : 1.25 * wavelength * std::max(2.0, r / 14) * grown(probe.focus_mm, 25);
+}
+
+// Edge of the scatterers' lattice: as coarse as the point spread allows, so that samples a beam
+// apart share scatterers.
+double cell_edge(double axial_fwhm, double frequency_mhz) {
+    return std::min(kCellMm * std::pow(3.5 / frequency_mhz, 0.7), axial_fwhm);
+}
+
+// Width of the scanned area at its lower edge, along the arc.
+double lower_edge_mm(const Probe& probe) {
+    if (probe.shape == ProbeShape::linear) return probe.width_mm;
+    const double radius = probe.shape == ProbeShape::curvilinear ? probe.radius_mm : 0;
+    return (radius + probe.depth_mm) * probe.field_of_view_rad;
 }
 
 // The number of looks goes from the near one to the other step by step, over a quarter of near_mm
@@ -219,6 +237,15 @@ int samples_along(const Probe& probe, const Machine& machine) {
     return std::max(static_cast<int>(stretches) * kStretch, kMin);
 }
 
+int beams_across(const Probe& probe, const Machine& machine) {
+    constexpr int kMax = 512;
+    const double frequency = frequency_of(machine.beam, probe);
+    const double edge = std::max(cell_edge(axial_width(machine.beam, frequency), frequency),
+                                 kCellPerStep * probe.depth_mm / samples_along(probe, machine));
+    const double needed = std::min(lower_edge_mm(probe) / (kMaxPitch * edge), double{kMax});
+    return std::max(16 * static_cast<int>(std::ceil(needed / 16)), machine.beam.lines);
+}
+
 Tables make_tables(const Probe& probe, const Machine& machine, const ScanGeometry& g) {
     Tables t;
     t.machine = machine;
@@ -226,11 +253,14 @@ Tables make_tables(const Probe& probe, const Machine& machine, const ScanGeometr
     const double frequency = frequency_of(beam, probe);
     const double elevation_mm = beam.elevation_mm > 0 ? beam.elevation_mm : probe.elevation_mm;
     t.frequency_mhz = frequency;
-    const double axial_fwhm = axial_width(beam, frequency);
+    double axial_fwhm = axial_width(beam, frequency);
+    const double pitch_mm =
+        g.fan ? (g.radius_mm + g.depth_mm) * g.line_step : g.line_step;  // at the lower edge
+    const double edge = std::max(cell_edge(axial_fwhm, frequency), kCellPerStep * g.step_mm);
+    t.cell_mm = std::clamp(pitch_mm / kMaxPitch, edge, kCoarsest * edge);
+    // The blend of the scatterers alone.
+    axial_fwhm = std::max(axial_fwhm, kFullWidthPerSigma * std::sqrt(kSpeckleVariance) * t.cell_mm);
     t.axial_mm = axial_fwhm;
-    // As coarse as the point spread allows, so that samples a beam apart share scatterers.
-    t.cell_mm = std::max(std::min(kCellMm * std::pow(3.5 / frequency, 0.7), axial_fwhm),
-                         kCellPerStep * g.step_mm);
     t.axial_reach = gaussian(rest_of(axial_fwhm, t.cell_mm) / g.step_mm, kMaxAxial, t.axial);
     const double axial_power = power_of_taps(t.axial, g.step_mm / t.cell_mm);
     // Peaks of interfaces are scaled as if all of the point spread were in the taps, which would

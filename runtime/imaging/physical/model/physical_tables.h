@@ -126,6 +126,11 @@ Machine default_machine(const Probe& probe);
 // pulse of a fan.
 bool shows_fine(const Machine& machine, const Probe& probe);
 
+// Beams that the machine's point spread needs down to the picture's lower edge, in whole blocks of
+// 16: the machine's own number, or as many as keep neighbours kMaxPitch cells of the scatterers
+// apart, so that speckle moves with the tissue.
+int beams_across(const Probe& probe, const Machine& machine);
+
 // Samples along a beam that the machine's point spread needs: 1.85 per width along the beam, in
 // whole stretches of 32; at least 384 and at most 512, that is 3/4 to 1 per pixel of a picture 512
 // high.

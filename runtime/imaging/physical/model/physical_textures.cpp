@@ -59,9 +59,9 @@ void store(const RawVector<float>& db, std::int8_t* out) {
     }
 }
 
-// Echo of parenchyma at middle scale: 2 dB over 6 mm, 0.6 dB over 1.3 mm whose depth itself varies
-// over 6 mm, and shading of 3.2 dB over 26 mm, fitted to a tracked sweep of a living liver
-// (docs/realism.md).
+// Echo of parenchyma at middle scale: 1.4 dB over 6 mm, 0.6 dB over 1.3 mm whose depth itself
+// varies over 6 mm, and shading of 1.5 dB over 26 mm. A tracked sweep of a living liver has 2 and
+// 3.2 dB (docs/realism.md), which hide a lesion: it is to be found.
 void make_parenchyma(std::int8_t* out) {
     const RawVector<float> fine = smooth_periodic_noise(kFineEdge, 0, 31),
                            depth = smooth_periodic_noise(kFineEdge, 2, 32),
@@ -69,9 +69,9 @@ void make_parenchyma(std::int8_t* out) {
                            shading = smooth_periodic_noise(kFineEdge, 10, 34);
     RawVector<float> db(fine.size());
     for (std::size_t i = 0; i < db.size(); ++i)
-        db[i] = 2 * middle[i] +
+        db[i] = 1.4f * middle[i] +
                 0.6f * static_cast<float>(std::exp(0.3 * static_cast<double>(depth[i]))) * fine[i] +
-                3.2f * shading[i];
+                1.5f * shading[i];
     store(db, out);
 }
 

@@ -51,9 +51,13 @@ struct StreakSearch {
     double turned = 0;       // sine of the largest angle by which pressing turns a beam at a place
     int found = 0;
 
-    // The label at a place, if it holds plates; negative: it does not.
+    // The label at a place, if it holds plates; negative: it does not. A lesion of the exercise
+    // holds none, and a plate that begins beside it does not reach into it.
     int plates_at(Point3 x) const {
+        constexpr double kBesideMm = 2;
         const Point3 v = scene.grid.voxel_from_point(x);
+        for (const TargetBall& t : scene.targets)
+            if (scene.voxel_mm * distance(v, t.centre_vx) < t.reach_mm + kBesideMm) return -1;
         const int label = label_at(scene, static_cast<int>(std::floor(v.x + 0.5)),
                                    static_cast<int>(std::floor(v.y + 0.5)),
                                    static_cast<int>(std::floor(v.z + 0.5)));

@@ -22,13 +22,13 @@ constexpr double kDoubleDb = -4;
 
 // Below the skin: its faces, the superficial fascia, then sheets of the fat.
 constexpr Sheet kOuter[] = {
-    {0.5, 4, 1.1},     {6.2, 14.5, 1.1}, {16.5, 9.5, 0.95},
-    {18.4, 6.5, 0.95}, {27.5, 7.5, 1},   {35, 7, 1},
+    {0.5, 2, 1.1},     {6.2, 9.5, 1.1}, {16.5, 5.5, 0.95},
+    {18.4, 2.5, 0.95}, {27.5, 3.5, 1},  {35, 3, 1},
 };
 // Above the organs: the peritoneum, then the sheets of three muscles.
 constexpr Sheet kInner[] = {
-    {1.4, 14, 1.2},   {2.7, 7.5, 0.85},  {6.2, 12.5, 1},    {7, 4, 0.95},
-    {8.3, 4.5, 0.95}, {12.6, 8.5, 0.95}, {18.5, 10.5, 1.1}, {22, 7, 1.1},
+    {1.4, 11, 1.2},   {2.7, 4.5, 0.85},  {6.2, 8.5, 1},    {7, 1, 0.95},
+    {8.3, 1.5, 0.95}, {12.6, 5.5, 0.95}, {18.5, 6.5, 1.1}, {22, 3, 1.1},
 };
 // Lamellae of fat and muscle between them, at random distances.
 constexpr double kLamellaDb = 4.5, kLamellaSpreadDb = 10;

@@ -432,7 +432,11 @@ int Ui::stepper(const char* id,
     const float side = std::min(box.h, 44.0f);
     Box rest = box;
     const Box plus = rest.take_right(side);
-    const Box words = name.empty() ? Box{} : rest.take_left(std::min(72.0f, 0.28f * box.w), 4);
+    // The value is never cut: the name takes what it leaves.
+    const float left = box.w - 2 * side - width(value, Type::bold) - 8;
+    const Box words =
+        name.empty() ? Box{}
+                     : rest.take_left(std::max(std::min({72.0f, 0.28f * box.w, left}), 0.0f), 4);
     const Box minus = rest.take_left(side);
     text(words, name, Type::body, colour::kDim);
     text(rest, value, Type::bold, enabled ? colour::kText : colour::kOff, Align::centre);

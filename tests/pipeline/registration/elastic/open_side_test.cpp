@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "pipeline/anatomy/analytic_torso.h"
@@ -138,6 +139,53 @@ TEST(OpenSide, TheOptionAndLandmarksOverruleIt) {
             EXPECT_EQ(note.text, "front");
         }
     }
+}
+
+bool warns(const RegisterResult& result, const std::string& words) {
+    return std::any_of(result.report.warnings.begin(), result.report.warnings.end(),
+                       [&](const std::string& w) { return w.find(words) != std::string::npos; });
+}
+
+// One mannequin of each build without landmarks. (With four of each, 20 of 20 as well.)
+TEST(HeadDirection, IsNamedWhereItsSignIsTurnedAndNotWhereItIsRight) {
+    for (const Build build : kBuilds) {
+        SCOPED_TRACE(build_name(build));
+        const BuiltMannequin mannequin = built_mannequin(build, 1, usual_sweep(build));
+        for (const double sign : {1.0, -1.0}) {
+            RegisterOptions options;
+            options.up = sign * mannequin.head;
+            const auto aligned = align_surfaces({torso_patient().skin, mannequin.sweep}, options);
+            ASSERT_TRUE(aligned);
+            EXPECT_EQ(warns(*aligned, "seems to point to the feet"), sign < 0);
+        }
+    }
+}
+
+// The torso's skin has no right and left: a landmark on one hip has.
+TEST(Handedness, OfALeftHandedSweepIsToldByALandmarkOffTheMidline) {
+    BuiltMannequin mannequin = built_mannequin(Build::belly, 1, {});
+    const auto hip = [&](double mirror) {
+        RegisterOptions options;
+        Surface sweep = mannequin.sweep;
+        options.landmarks = mannequin.landmarks;
+        AnalyticMannequinOptions mesh;
+        mesh.mesh = true;
+        mesh.points = 12000;
+        for (const AnalyticLandmark& mark : analytic_torso_landmarks(9, 0, mesh)) {
+            if (mark.name != "hip_bone_right") continue;
+            // Beside the pubis, by as much as on the patient.
+            const Point3 ct = mark.ct, pubis = mannequin.landmarks[1].ct;
+            const Vector3 right = cross(mannequin.head, mannequin.back), d = ct - pubis;
+            options.landmarks.push_back({mark.name, ct,
+                                         mannequin.landmarks[1].mannequin + d.x * right -
+                                             d.y * mannequin.back + d.z * mannequin.head});
+        }
+        for (Point3& p : sweep.points) p.x *= mirror;
+        for (Landmark& mark : options.landmarks) mark.mannequin.x *= mirror;
+        return *align_surfaces({torso_patient().skin, sweep}, options);
+    };
+    EXPECT_FALSE(warns(hip(1), "mirror image"));
+    EXPECT_TRUE(warns(hip(-1), "mirror image"));
 }
 
 }  // namespace

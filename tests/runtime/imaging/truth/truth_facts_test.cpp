@@ -20,7 +20,8 @@ TEST(Truth, TheNeedleIsWhereItsPoseSaysAndItsTipIsMarked) {
     input.needle = {{12, 0, 60}, axis};
     Planes planes(options);
     const FrameTruth& frame = truth.render(input, planes.spans());
-    EXPECT_TRUE(frame.tip_in_plane);
+    EXPECT_TRUE(frame.tip_in_plane && frame.tip_visible);
+    EXPECT_GT(frame.needle_visible_mm, 20);
     EXPECT_EQ(frame.tip_label, Phantom().label({12, 0, 60}));
     const double radius = 0.5 * needle_diameter_mm(exercise.needle);
     for (int row = 0; row < 300; ++row) {
@@ -42,6 +43,8 @@ TEST(Truth, TheNeedleIsWhereItsPoseSaysAndItsTipIsMarked) {
     EXPECT_FALSE(aside.tip_in_plane);
     EXPECT_EQ(aside.tip_probe.y, 20);
     EXPECT_EQ(aside.needle_in_image_mm, 0);
+    EXPECT_FALSE(aside.tip_visible);
+    EXPECT_EQ(aside.needle_visible_mm, 0);
     for (const std::uint8_t n : planes.needle) EXPECT_EQ(n, 0);
 }
 

@@ -5,8 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <thread>
 
+#include "formats/files/atomic_file.h"
 #include "runtime/player/app/case_steps.h"
 #include "runtime/player/session/clock.h"
 #include "support/small_case.h"
@@ -33,6 +35,40 @@ TEST(TargetsReached, TheTipMarksATargetWithinItsRadiusAndTheMarkStays) {
     record.needle.mannequin_from_drawn.translation = {0, 0, 0};
     mark_targets_reached(exercise, record, centres, reached);
     EXPECT_TRUE(reached[0]);
+}
+
+// A needle anywhere is no step: first the target is seen, then the needle in its plane, then the
+// tip near it; and what was done stays done.
+TEST(Steps, AreThoseThatWereDone) {
+    Exercise exercise;
+    exercise.probe.shape = ProbeShape::linear;
+    exercise.probe.width_mm = 60;
+    exercise.probe.depth_mm = 80;
+    std::vector<Point3> centres{{0, 20, 50}};  // beside the plane
+    FrameRecord record;
+    record.tools.has_probe = record.tools.has_needle = true;
+    record.needle.depth_mm = 30;
+    record.needle.mannequin_from_drawn = {Matrix3::from_columns({0, 0, -1}, {0, 1, 0}, {1, 0, 0}),
+                                          {0, 0, 50}};
+    StepsDone done;
+    note_steps(exercise, nullptr, record, centres, done);
+    EXPECT_FALSE(done.target_seen || done.needle_seen || done.tip_near);
+    centres[0] = {0, 1, 50};
+    record.needle.mannequin_from_drawn.translation = {-20, 10, 50};  // needle beside the plane
+    note_steps(exercise, nullptr, record, centres, done);
+    EXPECT_TRUE(done.target_seen);
+    EXPECT_FALSE(done.needle_seen);
+    record.needle.mannequin_from_drawn.translation = {-20, 0, 50};
+    note_steps(exercise, nullptr, record, centres, done);
+    EXPECT_TRUE(done.needle_seen);
+    EXPECT_FALSE(done.tip_near);
+    record.needle.mannequin_from_drawn.translation = {-10, 0, 50};
+    note_steps(exercise, nullptr, record, centres, done);
+    EXPECT_TRUE(done.tip_near);
+    record.tools.has_needle = false;
+    centres[0] = {0, 90, 50};
+    note_steps(exercise, nullptr, record, centres, done);
+    EXPECT_TRUE(done.target_seen && done.needle_seen && done.tip_near);
 }
 
 std::unique_ptr<OpenCase> small_open_case() {
@@ -79,6 +115,21 @@ TEST(LeavingAnAttempt, IsAskedAboutOnceAndTheAnswerHoldsForFourSeconds) {
     EXPECT_TRUE(may_leave_attempt(player, scan.training, "F5"));  // nothing to lose
 }
 
+// One press of the same key that finishes practice does not end an exam.
+TEST(EndingAnExam, IsAskedAboutOnce) {
+    Running running;
+    auto& [folder, player, loaded, scan] = running;
+    scan.training.exam = true;
+    player.now_s = 10;
+    EXPECT_FALSE(toggle_attempt(player, loaded, scan));
+    ASSERT_TRUE(scan.training.attempt);
+    ASSERT_EQ(player.notices.standing().size(), 1u);
+    EXPECT_NE(player.notices.standing()[0].text.find("exam"), std::string::npos);
+    player.now_s = 30;  // too late to be the answer
+    EXPECT_FALSE(toggle_attempt(player, loaded, scan));
+    EXPECT_TRUE(scan.training.attempt);
+}
+
 TEST(Hints, ComeOneByOneThenTheTargetsAndNeverInAnExam) {
     Running running;
     auto& [folder, player, loaded, scan] = running;
@@ -95,6 +146,18 @@ TEST(Hints, ComeOneByOneThenTheTargetsAndNeverInAnExam) {
     EXPECT_FALSE(shows_targets(scan, exercise));
     scan.training.attempt.reset();
     EXPECT_TRUE(shows_targets(scan, exercise));  // free scanning
+}
+
+TEST(UnkeptRecording, GoesWithItsObject) {
+    std::string path;
+    {
+        const UnkeptRecording recording;
+        path = recording.path();
+        ASSERT_FALSE(path.empty());
+        ASSERT_TRUE(write_file(path, std::string_view("x")));
+    }
+    EXPECT_FALSE(std::filesystem::exists(path));
+    EXPECT_FALSE(std::filesystem::exists(std::filesystem::path(path).parent_path()));
 }
 
 TEST(SavingCalibrations, WithNothingCalibratedKeepsWhatWasSaved) {

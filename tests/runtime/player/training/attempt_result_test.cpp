@@ -49,6 +49,22 @@ TEST(AttemptResult, ShowsTheWorstMissFirstAndSaysWhatToDo) {
     EXPECT_GT(result.rows[1].value_at, result.rows[1].limit_at);
 }
 
+// What went wrong first is said first: not to stop in the middle of what was never found.
+TEST(AttemptResult, TheAdviceFitsWhatHappened) {
+    const auto advice = [](double mm, double scanned) {
+        return std::string(
+            attempt_result(score_with({{"final_tip_to_target_mm", mm, 5, -INFINITY, mm <= 5}},
+                                      {{"targets_scanned_percent", scanned}}),
+                           {})
+                .advice);
+    };
+    EXPECT_EQ(advice(NAN, 0).rfind("Find the target first", 0), 0u);
+    EXPECT_EQ(advice(NAN, 100).rfind("Take the needle", 0), 0u);
+    EXPECT_EQ(advice(54, 100).rfind("Find the target first", 0), 0u);
+    EXPECT_EQ(advice(8, 100).rfind("Stop in the middle", 0), 0u);
+    EXPECT_EQ(advice(3, 100), "");
+}
+
 // Eight marks, of which the last alone is missed: it is shown all the same.
 TEST(AttemptResult, AMissedMarkIsAlwaysAmongTheFive) {
     std::vector<PassResult> marks;

@@ -71,6 +71,20 @@ TEST(GuidedStart, WaitsForAProbe) {
     EXPECT_EQ(guide.step(), GuideStep::slide);
 }
 
+// The exercise before is still shown when the guided start begins.
+TEST(GuidedStart, AJumpToAnotherStartIsNoSlide) {
+    GuidedStart guide;
+    GuideSight sight;
+    sight.has_probe = true;
+    EXPECT_FALSE(guide.observe(sight));
+    sight.mannequin_from_probe.translation = {120, 0, 0};
+    EXPECT_FALSE(guide.observe(sight));
+    sight.mannequin_from_probe.translation = {130, 0, 0};
+    EXPECT_FALSE(guide.observe(sight));
+    sight.mannequin_from_probe.translation = {146, 0, 0};
+    EXPECT_TRUE(guide.observe(sight));
+}
+
 TEST(GifFile, IsReadBackByTheLibraryWithEveryGreyAndTime) {
     const testing::TemporaryFolder folder;
     constexpr int kWidth = 16, kHeight = 20;

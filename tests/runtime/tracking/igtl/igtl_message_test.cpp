@@ -7,6 +7,9 @@
 
 #include <cmath>
 #include <cstdint>
+#include <string>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "support/random.h"
@@ -38,6 +41,83 @@ TEST(IgtlMessage, TransformComesBack) {
         EXPECT_LT(norm(poses[0].to_from.translation - pose.translation), 1e-4);
         EXPECT_LT(rotation_angle(transpose(poses[0].to_from.rotation) * pose.rotation), 1e-6);
     }
+}
+
+// Header version 2: 12 bytes before the content, then metadata.
+Bytes with_metadata(const Bytes& version1,
+                    const std::vector<std::pair<std::string, std::string>>& entries) {
+    Bytes sizes, texts;
+    const auto put = [](Bytes& to, std::uint64_t v, int bytes) {
+        while (bytes-- > 0) to.push_back(static_cast<std::uint8_t>(v >> (8 * bytes)));
+    };
+    put(sizes, entries.size(), 2);
+    for (const auto& [key, value] : entries) {
+        put(sizes, key.size(), 2);
+        put(sizes, 3, 2);
+        put(sizes, value.size(), 4);
+        texts.insert(texts.end(), key.begin(), key.end());
+        texts.insert(texts.end(), value.begin(), value.end());
+    }
+    Bytes body;
+    put(body, 12, 2);
+    put(body, sizes.size(), 2);
+    put(body, texts.size(), 4);
+    put(body, 1, 4);
+    body.insert(body.end(), version1.begin() + igtl::kHeaderSize, version1.end());
+    body.insert(body.end(), sizes.begin(), sizes.end());
+    body.insert(body.end(), texts.begin(), texts.end());
+    return body;
+}
+
+TEST(IgtlMessage, MetadataSaysWhichPosesAreNone) {
+    igtl::Header header;
+    header.version = 2;
+    header.type = "TRANSFORM";
+    header.device = "NeedleToTracker";
+    const Bytes message = igtl::encode_transform(header.device, 1, {});
+    using igtl::PoseFault;
+    for (const auto& [key, value, fault] :
+         {std::tuple("TransformStatus", "INVALID", PoseFault::lost),
+          {"TransformStatus", "OUT_OF_VIEW", PoseFault::lost},
+          {"NeedleToTrackerStatus", "MISSING", PoseFault::lost},
+          {"NeedleToTrackerTransformStatus", "INVALID", PoseFault::lost},
+          {"TransformStatus", "OK", PoseFault::none},
+          {"ProbeToTrackerStatus", "INVALID", PoseFault::none},
+          {"Comment", "INVALID", PoseFault::none}}) {
+        const auto poses =
+            igtl::parse_poses(header, with_metadata(message, {{"FrameNumber", "7"}, {key, value}}));
+        ASSERT_EQ(poses.size(), 1u);
+        EXPECT_EQ(poses[0].fault, fault) << key << " " << value;
+    }
+    // Cut anywhere, or with sizes beyond the message: no fault but that of the bytes.
+    const Bytes whole = with_metadata(message, {{"TransformStatus", "INVALID"}});
+    for (std::size_t n = 0; n < whole.size(); ++n)
+        igtl::parse_poses(header, std::span(whole).first(n));
+    for (std::size_t at = 0; at < whole.size(); ++at) {
+        Bytes damaged = whole;
+        damaged[at] = 255;
+        igtl::parse_poses(header, damaged);
+    }
+}
+
+TEST(IgtlMessage, FaultsOfAMatrixAreTold) {
+    const auto fault_of = [](Matrix3 m) {
+        const Bytes message = igtl::encode_transform("ProbeToTracker", 1, {m, {1, 2, 3}});
+        igtl::MessageReader reader;
+        reader.add(message);
+        EXPECT_EQ(reader.next(), igtl::MessageReader::Event::message);
+        const auto poses = igtl::parse_poses(reader.header(), reader.body());
+        return poses.size() == 1 ? poses[0].fault : igtl::PoseFault::none;
+    };
+    Matrix3 scaled, mirrored, no_number, zero{{0, 0, 0, 0, 0, 0, 0, 0, 0}};
+    for (double& v : scaled.m) v *= 0.2;
+    mirrored(0, 0) = -1;
+    no_number(1, 1) = NAN;
+    EXPECT_EQ(fault_of({}), igtl::PoseFault::none);
+    EXPECT_EQ(fault_of(scaled), igtl::PoseFault::scaled);
+    EXPECT_EQ(fault_of(zero), igtl::PoseFault::scaled);
+    EXPECT_EQ(fault_of(mirrored), igtl::PoseFault::mirrored);
+    EXPECT_EQ(fault_of(no_number), igtl::PoseFault::not_finite);
 }
 
 TEST(IgtlMessage, ForceComesBackAndNonsenseDoesNot) {

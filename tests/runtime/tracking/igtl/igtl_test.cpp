@@ -152,6 +152,112 @@ TEST(IgtlTracker, ForceComesWithTheNextPose) {
         tracker.eventually([&] { return tracker->poll(0, reading) && reading.force_n == 4.5; }));
 }
 
+// A server that is there and whose messages are all passed over: health says why.
+TEST(IgtlTracker, SaysWhyNoPoseComes) {
+    Rigid scaled{{}, {1, 2, 300}}, mirrored = scaled, metres{{}, {0.1, 0.2, 0.9}};
+    for (double& v : scaled.rotation.m) v *= 0.2;
+    mirrored.rotation(0, 0) = -1;
+    Bytes wrong = igtl::encode_transform("ProbeToTracker", 1, {});
+    wrong[57] ^= 1;
+    const std::pair<Bytes, const char*> cases[] = {
+        {wrong, "wrong checksum"},
+        {igtl::encode_transform("ImageToReference", 1, scaled), "ImageToReference has a scale"},
+        {igtl::encode_transform("ProbeToTracker", 1, mirrored), "mirrored"},
+        {igtl::encode_transform("UsProbeToReference", 1, {}), "--tool probe=UsProbeToReference"},
+        {igtl::encode_transform("ProbeToTracker", 1, metres), "metres"},
+        {igtl::encode("STATUS", "S", 1, Bytes(31, 7)), "none with a pose"}};
+    for (const auto& [message, sentence] : cases) {
+        Result<Socket> server = Socket::listen("127.0.0.1", 0);
+        ASSERT_TRUE(server);
+        IgtlTrackerOptions options;
+        options.port = server->port();
+        options.explain_s = 0.1;
+        auto started = IgtlTracker::start(options, clock_from_now());
+        ASSERT_TRUE(started);
+        NotifyingTracker tracker(std::move(*started));
+        Socket client = server->accept(15);
+        ASSERT_TRUE(client.open());
+        EXPECT_TRUE(tracker.eventually([&, &message = message, &sentence = sentence] {
+            client.write(message);
+            return tracker->health().message.find(sentence) != std::string::npos;
+        })) << sentence
+            << ": " << tracker->health().message;
+    }
+}
+
+// The TrackingDataServer of the library sends once it is asked.
+TEST(IgtlTracker, AsksASilentServerForItsPoses) {
+    Result<Socket> server = Socket::listen("127.0.0.1", 0);
+    ASSERT_TRUE(server);
+    IgtlTrackerOptions options;
+    options.port = server->port();
+    options.ask_s = 0.05;
+    auto started = IgtlTracker::start(options, clock_from_now());
+    ASSERT_TRUE(started);
+    Socket client = server->accept(15);
+    ASSERT_TRUE(client.open());
+    Bytes asked(128);
+    const long n = client.read(asked, 15);
+    ASSERT_EQ(n, 94);  // a header and 36 bytes
+    EXPECT_EQ(std::string(reinterpret_cast<const char*>(asked.data()) + 2), "STT_TDATA");
+}
+
+TEST(IgtlTracker, EachSensorHasItsOwnTimeFrameAndName) {
+    Result<Socket> server = Socket::listen("127.0.0.1", 0);
+    ASSERT_TRUE(server);
+    IgtlTrackerOptions options;
+    options.port = server->port();
+    options.tools = {{"needle", "TipToReference"}};
+    auto started = IgtlTracker::start(options, clock_from_now());
+    ASSERT_TRUE(started);
+    NotifyingTracker tracker(std::move(*started));
+    Socket client = server->accept(15);
+    ASSERT_TRUE(client.open());
+    client.write(igtl::encode_transform("NeedleToTracker", 1, {{}, {9, 9, 9}}));
+    client.write(igtl::encode_transform("ProbeToMannequin", 1, {{}, {1, 0, 0}}));
+    client.write(igtl::encode_transform("TipToReference", 1, {{}, {2, 0, 0}}));
+    client.write(igtl::encode_transform("ReferenceToTracker", 1, {{}, {400, 0, 0}}));
+    TrackerReading reading;
+    ASSERT_TRUE(
+        tracker.eventually([&] { return tracker->poll(0, reading) && reading.sensor_count == 4; }));
+    EXPECT_FALSE(reading.in_mannequin);
+    EXPECT_TRUE(reading.sensors[kProbeSensor].in_mannequin);
+    EXPECT_FALSE(reading.sensors[kNeedleSensor].in_mannequin);
+    EXPECT_EQ(reading.sensors[kNeedleSensor].world_from_sensor.translation.x, 2);
+    const double needle_s = reading.sensors[kNeedleSensor].time_s;
+    ASSERT_TRUE(tracker.eventually([&] {
+        client.write(igtl::encode_transform("ProbeToMannequin", 1, {{}, {1, 0, 0}}));
+        return tracker->poll(0, reading) && reading.sensors[kProbeSensor].time_s > needle_s;
+    }));
+    EXPECT_EQ(reading.sensors[kNeedleSensor].time_s, needle_s);
+}
+
+TEST(IgtlTracker, PosesAreTakenRelativeToAReference) {
+    Result<Socket> server = Socket::listen("127.0.0.1", 0);
+    ASSERT_TRUE(server);
+    IgtlTrackerOptions options;
+    options.port = server->port();
+    options.tools = {{"reference", "ReferenceToTracker"}};
+    auto started = IgtlTracker::start(options, clock_from_now());
+    ASSERT_TRUE(started);
+    NotifyingTracker tracker(std::move(*started));
+    Socket client = server->accept(15);
+    ASSERT_TRUE(client.open());
+    TrackerReading reading;
+    const auto x_with = [&](double reference, double probe) {
+        EXPECT_TRUE(tracker.eventually([&] {
+            client.write(igtl::encode_transform("ReferenceToTracker", 1, {{}, {reference, 0, 0}}));
+            client.write(igtl::encode_transform("ProbeToTracker", 1, {{}, {probe, 0, 0}}));
+            return tracker->poll(0, reading) &&
+                   reading.sensors[kProbeSensor].state == SensorState::ok &&
+                   reading.sensors[kProbeSensor].world_from_sensor.translation.x ==
+                       probe - reference;
+        }));
+    };
+    x_with(100, 250);
+    x_with(300, 250);
+}
+
 TEST(IgtlTracker, ListensToAClientOfTheLibrary) {
     auto tracker = start_tracker(0, true);
     const int port = static_cast<IgtlTracker&>(*tracker).port();
@@ -321,6 +427,8 @@ TEST(IgtlAddress, IsReadAndRefused) {
     EXPECT_EQ(port, 18944);
     EXPECT_TRUE(split_address("scanner.local:5", host, port));
     EXPECT_EQ(host, "scanner.local");
+    EXPECT_TRUE(split_address("[::1]:18944", host, port));
+    EXPECT_EQ(host, "::1");
     for (const char* bad : {"", "a:b", "1:", "host:99999", "host:-1", "host:1x"}) {
         EXPECT_FALSE(split_address(bad, host, port)) << bad;
     }

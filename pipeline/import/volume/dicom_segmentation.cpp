@@ -1,0 +1,867 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/import/volume/dicom_segmentation.h"
+
+#include <iconv.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <set>
+
+#include "formats/text/number_text.h"
+#include "pipeline/base/memory_limit.h"
+#include "pipeline/base/quiet_library.h"
+#include "pipeline/base/source_checks.h"
+#include "pipeline/base/text.h"
+#include "pipeline/import/volume/dicom_frames.h"
+
+namespace sonocase::pipeline::inline import_volume {
+namespace {
+
+constexpr DicomTag kCharacterSet = 0x00080005, kSopClass = 0x00080016, kCode = 0x00080100,
+                   kScheme = 0x00080102, kMeaning = 0x00080104, kOrganization = 0x00209311,
+                   kSamples = 0x00280002, kFrames = 0x00280008, kRows = 0x00280010,
+                   kColumns = 0x00280011, kBits = 0x00280100, kPadding = 0x00280120,
+                   kType = 0x00620001, kSegments = 0x00620002, kSegmentNumber = 0x00620004,
+                   kLabel = 0x00620005, kColour = 0x0062000d, kMaximum = 0x0062000e,
+                   kPropertyType = 0x0062000f, kFractionalType = 0x00620010,
+                   kTypeModifier = 0x00620011, kPerFrame = 0x52009230;
+
+constexpr const char* kAgain = "write the segmentation again";
+constexpr const char* kUnpack =
+    "unpack it first: dcmdrle or dcmdjpeg of DCMTK, gdcmconv --raw of GDCM";
+
+struct Segment {
+    int number = 0;
+    std::string name, code;  // code: "Liver (SCT 10200004)"
+    std::string modifier;    // "Left"
+    std::string colour;      // "0.5 0.2 0.1", or empty
+    std::vector<int> frames;
+    std::uint64_t voxels = 0;
+};
+
+// The text in UTF-8, by the names that DICOM has for character sets.
+std::string utf8(const std::string& text, const std::string& set) {
+    const bool plain = std::all_of(text.begin(), text.end(),
+                                   [](char c) { return static_cast<unsigned char>(c) < 128; });
+    if (plain && text.find('\x1b') == std::string::npos) return text;
+    static constexpr std::pair<const char*, const char*> kSets[] = {
+        {"192", "UTF-8"},       {"100", "ISO-8859-1"},
+        {"101", "ISO-8859-2"},  {"109", "ISO-8859-3"},
+        {"110", "ISO-8859-4"},  {"144", "ISO-8859-5"},
+        {"127", "ISO-8859-6"},  {"126", "ISO-8859-7"},
+        {"138", "ISO-8859-8"},  {"148", "ISO-8859-9"},
+        {"203", "ISO-8859-15"}, {"166", "TIS-620"},
+        {"IR 13", "SHIFT_JIS"}, {"IR 87", "ISO-2022-JP"},
+        {"IR 149", "EUC-KR"},   {"GB18030", "GB18030"},
+        {"GBK", "GBK"}};
+    std::vector<const char*> from;
+    for (const auto& [dicom, name] : kSets)
+        if (set.find(dicom) != std::string::npos) from.push_back(name);
+    from.insert(from.end(), {"UTF-8", "ISO-8859-1"});  // what is written where none is named
+    for (const char* name : from) {
+        const iconv_t convert = iconv_open("UTF-8", name);
+        if (convert == reinterpret_cast<iconv_t>(-1)) continue;
+        std::string in = text, out(4 * text.size() + 16, '\0');
+        char *source = in.data(), *target = out.data();
+        std::size_t left = in.size(), room = out.size();
+        const bool good =
+            iconv(convert, &source, &left, &target, &room) != static_cast<std::size_t>(-1) &&
+            left == 0;
+        iconv_close(convert);
+        if (!good) continue;
+        out.resize(out.size() - room);
+        return out;
+    }
+    return text;
+}
+
+// A label that says nothing of what the segment is: "", "Segment_3", "label 12".
+bool says_nothing(const std::string& label) {
+    std::string word = lower_case(label);
+    std::erase_if(word, [](char c) { return (c >= '0' && c <= '9') || std::strchr(" _-#:.", c); });
+    return word.empty() || word == "segment" || word == "label" || word == "segmentation" ||
+           word == "unknown" || word == "roi";
+}
+
+// PCS-values of 16 bits to sRGB (ICC profile connection space, D50), as text from 0 to 1.
+std::string rgb_of_lab(const DicomSet& set) {
+    const std::vector<std::uint16_t> lab = shorts_of(set, kColour);
+    if (lab.size() < 3) return "";
+    const double l = lab[0] * 100.0 / 65535, a = lab[1] * 255.0 / 65535 - 128,
+                 b = lab[2] * 255.0 / 65535 - 128;
+    const auto from = [](double t) {
+        return t > 6.0 / 29 ? t * t * t : 3 * 36.0 / 841 * (t - 4.0 / 29);
+    };
+    const double y = from((l + 16) / 116), x = 0.9642 * from((l + 16) / 116 + a / 500),
+                 z = 0.8249 * from((l + 16) / 116 - b / 200);
+    const double linear[3] = {3.1339 * x - 1.6169 * y - 0.4906 * z,
+                              -0.9788 * x + 1.9161 * y + 0.0335 * z,
+                              0.0719 * x - 0.2290 * y + 1.4052 * z};
+    std::string text;
+    for (const double value : linear) {
+        const double v = std::clamp(value, 0.0, 1.0);
+        const double s = v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055;
+        text += (text.empty() ? "" : " ") + number_text(s, 3);
+    }
+    return text;
+}
+
+Result<std::vector<Segment>> segments_of(const DicomSet& set, const std::string& path) {
+    const std::string characters = text_of(set, kCharacterSet);
+    const auto words = [&](const DicomSet& of, DicomTag tag) {
+        std::string result = utf8(text_of(of, tag), characters);
+        for (char& c : result)
+            if (static_cast<unsigned char>(c) < 32) c = ' ';
+        return result;
+    };
+    std::vector<Segment> segments;
+    for (const DicomSet& item : items_of(set, kSegments)) {
+        Segment segment;
+        segment.number = short_of(item, kSegmentNumber);
+        segment.name = words(item, kLabel);
+        segment.colour = rgb_of_lab(item);
+        std::string meaning;
+        if (const auto types = items_of(item, kPropertyType); !types.empty()) {
+            const DicomSet& type = types.front();
+            meaning = words(type, kMeaning);
+            segment.code = meaning + " (" + words(type, kScheme) + " " + words(type, kCode) + ")";
+            if (const auto sides = items_of(type, kTypeModifier); !sides.empty())
+                segment.modifier = words(sides.front(), kMeaning);
+        }
+        if (says_nothing(segment.name) && !meaning.empty())
+            segment.name = segment.modifier.empty() ? meaning : meaning + " " + segment.modifier;
+        if (segment.name.empty()) segment.name = "segment_" + std::to_string(segment.number);
+        for (const Segment& other : segments)
+            if (other.number == segment.number)
+                return Error{"two segments have the number " + std::to_string(segment.number) +
+                                 ": '" + other.name + "' and '" + segment.name + "'",
+                             path, kAgain};
+        segments.push_back(std::move(segment));
+    }
+    return segments;
+}
+
+// Makes names unlike: by the side that the type's modifier gives, else by a number.
+void tell_apart(std::vector<Segment>& segments, std::vector<std::string>& warnings) {
+    std::map<std::string, int> count;
+    for (const Segment& segment : segments) ++count[segment.name];
+    for (Segment& segment : segments)
+        if (count[segment.name] > 1 && !segment.modifier.empty() &&
+            lower_case(segment.name).find(lower_case(segment.modifier)) == std::string::npos)
+            segment.name += " " + segment.modifier;
+    std::set<std::string> taken;
+    for (Segment& segment : segments) {
+        std::string name = segment.name;
+        for (int n = 2; !taken.insert(name).second; ++n)
+            name = segment.name + "_" + std::to_string(n);
+        if (name != segment.name)
+            warnings.push_back("two segments of the DICOM segmentation are named '" + segment.name +
+                               "': number " + std::to_string(segment.number) + " is called '" +
+                               name + "' here");
+        segment.name = name;
+    }
+}
+
+enum class Kind { binary, fractional, labelmap };
+
+struct Object {
+    DicomHeader header;
+    Kind kind = Kind::binary;
+    int rows = 0, columns = 0, bits = 0;
+    std::vector<DicomFrame> frames;
+    std::vector<Segment> segments;
+
+    const DicomSet& set() const { return header.set; }
+    std::size_t frame_pixels() const {
+        return static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns);
+    }
+};
+
+Status read_header(const std::string& path, Object& object) {
+    auto header = read_dicom_header(path);
+    if (!header)
+        return Error{"cannot be read as DICOM: the file is damaged or cut off", path,
+                     "copy it or export it again"};
+    object.header = *std::move(header);
+    const DicomSet& set = object.set();
+    if (text_of(set, kSopClass) == "1.2.840.10008.5.1.4.1.1.66.5")
+        return Error{"a DICOM surface segmentation: triangles, not voxels", path,
+                     "export its surfaces as STL or PLY, and give those as organ meshes"};
+    const std::string type = text_of(set, kType);
+    if (type != "BINARY" && type != "FRACTIONAL" && type != "LABELMAP")
+        return Error{"a DICOM segmentation of an unknown type", path,
+                     "expected BINARY, FRACTIONAL or LABELMAP"};
+    object.kind = type == "BINARY"       ? Kind::binary
+                  : type == "FRACTIONAL" ? Kind::fractional
+                                         : Kind::labelmap;
+    object.rows = short_of(set, kRows);
+    object.columns = short_of(set, kColumns);
+    object.bits = short_of(set, kBits);
+    const int frames = whole_of(set, kFrames);
+    if (object.rows < 1 || object.columns < 1 || frames < 1)
+        return Error{text("a DICOM segmentation of %d x %d pixels and %d frames", object.columns,
+                          object.rows, frames),
+                     path, "expected at least one frame: is the segmentation empty?"};
+    const bool bits_fit = object.kind == Kind::binary       ? object.bits == 1 || object.bits == 8
+                          : object.kind == Kind::fractional ? object.bits == 8
+                                                            : object.bits == 8 || object.bits == 16;
+    if (!bits_fit || short_of(set, kSamples) > 1)
+        return Error{text("a DICOM segmentation (%s) of %d bits", type.c_str(), object.bits), path,
+                     "expected 1 bit (BINARY), 8 (FRACTIONAL), 8 or 16 (LABELMAP)"};
+    const std::size_t given = items_of(set, kPerFrame).size();
+    if (given != static_cast<std::size_t>(frames) && !(frames == 1 && given == 0)) {
+        if (text_of(set, kOrganization) == "TILED_FULL")
+            return Error{"a DICOM segmentation of a microscope slide", path,
+                         "expected that of a CT or MR"};
+        return Error{text("a DICOM segmentation of %d frames that places %zu", frames, given), path,
+                     kAgain};
+    }
+    object.frames = frames_of(set, frames);
+    SONOCASE_TRY(auto segments, segments_of(set, path));
+    object.segments = std::move(segments);
+    return Done{};
+}
+
+std::string frame_text(std::size_t n) {
+    return "frame " + std::to_string(n + 1);
+}
+
+// Where the frames lie in the lattice.
+struct FramePlaces {
+    Grid grid;
+    std::vector<int> slice, column, row;  // # frames: of the first pixel
+    std::vector<Note> notes;
+    std::vector<std::string> warnings;
+};
+
+Result<FramePlaces> place_frames(const Object& object,
+                                 double scan_step_mm,
+                                 bool resample_shear,
+                                 const std::string& path) {
+    const DicomFrame& first = object.frames.front();
+    const Vector3 normal = first.normal();
+    std::vector<double> places, right, down;  // of the first pixel: mm, columns, rows
+    for (std::size_t n = 0; n < object.frames.size(); ++n) {
+        const DicomFrame& frame = object.frames[n];
+        if (!frame.fault.empty()) return Error{frame_text(n) + ": " + frame.fault, path, kAgain};
+        if (!frame.placed())
+            return Error{frame_text(n) + " does not say where it lies", path,
+                         "expected PlanePositionSequence and PlaneOrientationSequence: " +
+                             std::string(kAgain)};
+        if (!(frame.row_spacing_mm > 0))
+            return Error{frame_text(n) + " does not say how large its pixels are", path,
+                         "expected PixelMeasuresSequence: " + std::string(kAgain)};
+        if (norm(frame.along_rows - first.along_rows) > 1e-3 ||
+            norm(frame.along_columns - first.along_columns) > 1e-3)
+            return Error{frame_text(n) + " is turned against frame 1", path,
+                         "expected parallel frames: resample the segmentation to one grid"};
+        if (std::abs(frame.row_spacing_mm / first.row_spacing_mm - 1) > 1e-3 ||
+            std::abs(frame.column_spacing_mm / first.column_spacing_mm - 1) > 1e-3)
+            return Error{frame_text(n) + text(" has pixels of %.4g x %.4g mm, frame 1 of %.4g x "
+                                              "%.4g",
+                                              frame.column_spacing_mm, frame.row_spacing_mm,
+                                              first.column_spacing_mm, first.row_spacing_mm),
+                         path, "resample the segmentation to one grid"};
+        const Vector3 from = frame.position - first.position;
+        places.push_back(dot(from, normal));
+        right.push_back(dot(from, first.along_rows) / first.column_spacing_mm);
+        down.push_back(dot(from, first.along_columns) / first.row_spacing_mm);
+    }
+    SONOCASE_TRY(auto lattice, lattice_of(places, first, scan_step_mm, path));
+    FramePlaces result;
+    result.warnings = std::move(lattice.warnings);
+    result.slice = std::move(lattice.slice);
+    // Frames may lie beside one another by whole pixels, as those that were cropped do.
+    double off = 0;
+    std::size_t worst = 0;
+    for (std::size_t n = 0; n < places.size(); ++n) {
+        result.column.push_back(static_cast<int>(std::lround(right[n])));
+        result.row.push_back(static_cast<int>(std::lround(down[n])));
+        const double here = std::max(std::abs(right[n] - result.column.back()),
+                                     std::abs(down[n] - result.row.back()));
+        if (!(std::abs(right[n]) < 65535 && std::abs(down[n]) < 65535)) {
+            off = 65535;
+            worst = n;
+        } else if (here > off) {
+            off = here;
+            worst = n;
+        }
+    }
+    if (off > 0.1 && !(resample_shear && off <= 0.5))
+        return Error{
+            frame_text(worst) +
+                text(" lies %.3g mm to the side and %.3g mm down against frame 1, which is no "
+                     "whole number of pixels (a tilted gantry?)",
+                     right[worst] * first.column_spacing_mm, down[worst] * first.row_spacing_mm),
+            path,
+            "give --resample-shear, or resample the scan and its segmentation to an orthogonal "
+            "grid first"};
+    if (off > 0.1)
+        result.warnings.push_back(
+            text("frames of the DICOM segmentation lie beside one lattice (a tilted gantry?): each "
+                 "was moved to the nearest pixels, to within %.2g mm",
+                 std::hypot(first.row_spacing_mm, first.column_spacing_mm) / 2));
+    else if (off > 1e-3)
+        result.notes.push_back(
+            {"off_lattice", text("frames lie up to %.2g of a pixel off one lattice", off)});
+    const auto [left, rightmost] = std::minmax_element(result.column.begin(), result.column.end());
+    const auto [top, bottom] = std::minmax_element(result.row.begin(), result.row.end());
+    const int low_column = *left, low_row = *top;
+    const Int3 size{object.columns + *rightmost - low_column, object.rows + *bottom - low_row,
+                    lattice.slices};
+    for (int& column : result.column) column -= low_column;
+    for (int& row : result.row) row -= low_row;
+    const double lowest = *std::min_element(places.begin(), places.end());
+    const Point3 corner = first.position + lowest * normal +
+                          low_column * first.column_spacing_mm * first.along_rows +
+                          low_row * first.row_spacing_mm * first.along_columns;
+    result.grid = ras_grid(corner, first, lattice.step_mm, size);
+    for (int axis = 0; axis < 3; ++axis)
+        if (size[axis] > 65535 || size[axis] * result.grid.spacing_mm[axis] > kMaxTorsoMm)
+            return Error{text("frames fill %.4g x %.4g x %.4g mm", size.x * first.column_spacing_mm,
+                              size.y * first.row_spacing_mm, size.z * lattice.step_mm),
+                         path, "expected a torso: check the positions of the frames"};
+    return result;
+}
+
+// The pixels as the file means them. `frame_step` is the number of values from frame to frame:
+// bits of a packed object, else whole values of its bits.
+struct Pixels {
+    std::vector<char> kept;
+    const std::uint8_t* bytes = nullptr;
+    std::size_t frame_step = 0;
+};
+
+// One frame of run lengths (PackBits): 8 bits, or 16 as their upper and then their lower bytes.
+// False where it is damaged. GDCM reads beyond the end of such a one.
+bool unpack_run_lengths(std::string_view from, std::size_t pixels, std::size_t bytes, char* to) {
+    const auto number = [&](std::size_t n) {
+        std::uint32_t value = 0;
+        for (std::size_t b = 0; b < 4; ++b)
+            value |= std::uint32_t{static_cast<std::uint8_t>(from[4 * n + b])} << (8 * b);
+        return value;
+    };
+    if (from.size() < 64 || number(0) != bytes) return false;
+    for (std::size_t plane = 0; plane < bytes; ++plane) {
+        std::size_t at = number(plane + 1), done = 0;
+        while (done < pixels) {
+            if (at >= from.size()) return false;
+            const int code = static_cast<signed char>(from[at++]);
+            if (code == -128) continue;
+            const auto count = static_cast<std::size_t>(code < 0 ? 1 - code : 1 + code);
+            const std::size_t stored = code < 0 ? 1 : count;
+            if (stored > from.size() - at || count > pixels - done) return false;
+            for (std::size_t n = 0; n < count; ++n)
+                to[(done + n) * bytes + bytes - 1 - plane] = from[at + (code < 0 ? 0 : n)];
+            at += stored;
+            done += count;
+        }
+    }
+    return true;
+}
+
+// Compressed frames: one fragment each of run lengths or deflate, or what GDCM knows.
+Status unpack(const Object& object, const std::string& path, Pixels& pixels) {
+    const DicomHeader& header = object.header;
+    const bool run_lengths = header.transfer_syntax == "1.2.840.10008.1.2.5";
+    const bool deflate = header.transfer_syntax == "1.2.840.10008.1.2.8.1";
+    const std::size_t frame = object.frame_pixels(), frames = object.frames.size();
+    const auto bits = static_cast<std::size_t>(object.bits);
+    const std::size_t bytes = (frame * bits + 7) / 8;  // each frame begins with a byte of its own
+    if (bits == 1 && !deflate)
+        return Error{"a DICOM segmentation whose single bits are compressed", path, kUnpack};
+    if (bytes * frames > std::size_t{4} << 30)
+        return Error{"compressed frames of more than 4 GB", path, kUnpack};
+    const Error failed{
+        "the compressed frames are damaged, or packed in a way that is not known here", path,
+        kUnpack};
+    pixels.kept.resize(bytes * frames);
+    pixels.bytes = reinterpret_cast<const std::uint8_t*>(pixels.kept.data());
+    if (bits == 1) pixels.frame_step = bytes * 8;
+    if (!run_lengths && !deflate) {
+        if (!unpack_dicom_pixels(path, object.columns, object.rows, static_cast<int>(frames),
+                                 object.bits, pixels.kept.data()))
+            return failed;
+        return Done{};
+    }
+    const std::vector<std::string> fragments = read_dicom_fragments(path, header);
+    if (fragments.size() != frames) return failed;
+    for (std::size_t n = 0; n < frames; ++n) {
+        char* to = pixels.kept.data() + n * bytes;
+        if (run_lengths) {
+            if (!unpack_run_lengths(fragments[n], frame, bits / 8, to)) return failed;
+            continue;
+        }
+        const std::vector<char> whole = inflate_dicom(fragments[n]);
+        if (whole.size() < bytes) return failed;
+        std::copy_n(whole.begin(), bytes, to);
+    }
+    return Done{};
+}
+
+Status read_pixels(const Object& object,
+                   const std::string& path,
+                   Pixels& pixels,
+                   std::vector<std::string>& warnings) {
+    const DicomHeader& header = object.header;
+    const std::size_t frame = object.frame_pixels(), frames = object.frames.size();
+    const std::uint64_t bits = frame * frames * static_cast<std::uint64_t>(object.bits);
+    const std::uint64_t needed = (bits + 7) / 8;
+    pixels.frame_step = frame;
+    if (!header.has_pixels || header.cut_off(needed))
+        return Error{"file is cut off: it ends before its pixels do", path,
+                     "copy it or export it again"};
+    if (header.packed) return unpack(object, path, pixels);
+    if (header.set.big_endian && object.bits != 8)
+        return Error{"a DICOM segmentation in big-endian order", path,
+                     "turn it first: dcmconv +te IN OUT (DCMTK)"};
+    const std::uint64_t length = header.pixels_end - header.pixels_at;
+    if (length < needed)
+        return Error{text("%.0f bytes of pixels, where its %zu frames take %.0f",
+                          static_cast<double>(length), frames, static_cast<double>(needed)),
+                     path, kAgain};
+    if (header.inflated) {
+        pixels.bytes =
+            reinterpret_cast<const std::uint8_t*>(header.bytes.data() + header.pixels_at);
+    } else {
+        std::ifstream file(path, std::ios::binary);
+        file.seekg(static_cast<std::streamoff>(header.pixels_at));
+        pixels.kept.resize(length);
+        if (!file.read(pixels.kept.data(), static_cast<std::streamsize>(length)))
+            return Error{"cannot be read", path, "check that it may be read"};
+        pixels.bytes = reinterpret_cast<const std::uint8_t*>(pixels.kept.data());
+    }
+    // Bits run on from frame to frame. Some programs begin each frame with a byte of its own, which
+    // the length shows.
+    const std::size_t apart = frames * ((frame + 7) / 8);
+    if (object.bits == 1 && length > (bits + 7) / 8 + 1 &&
+        (length == apart || length == apart + 1)) {
+        pixels.frame_step = (frame + 7) / 8 * 8;
+        warnings.push_back(
+            "each frame of the DICOM segmentation begins with a byte of its own, against the "
+            "standard, and was read so: look at its slices");
+    }
+    return Done{};
+}
+
+// Runs of the pixels of a frame that are inside.
+template <class Use>
+void for_frame_runs(const Object& object, const Pixels& pixels, int maximum, int frame, Use use) {
+    const std::size_t count = object.frame_pixels();
+    const std::size_t begin = static_cast<std::size_t>(frame) * pixels.frame_step;
+    if (object.bits == 1) {
+        for_bit_runs(pixels.bytes, begin, count, use);
+        return;
+    }
+    const int threshold = object.kind == Kind::fractional ? std::max(1, (maximum + 1) / 2) : 1;
+    const std::uint8_t* values = pixels.bytes + begin;
+    for (std::size_t n = 0; n < count;) {
+        if (values[n] < threshold) {
+            ++n;
+            continue;
+        }
+        const std::size_t first = n;
+        while (n < count && values[n] >= threshold) ++n;
+        use(first, n - first);
+    }
+}
+
+// Calls use(voxel of the volume, pixels) for the rows that a run of a frame's pixels covers.
+template <class Use>
+void for_rows(const Object& object,
+              const FramePlaces& where,
+              std::size_t frame,
+              std::size_t first,
+              std::size_t count,
+              Use use) {
+    const auto columns = static_cast<std::size_t>(object.columns);
+    const auto across = static_cast<std::size_t>(where.grid.size.x),
+               down = static_cast<std::size_t>(where.grid.size.y);
+    while (count > 0) {
+        const std::size_t row = first / columns, column = first % columns;
+        const std::size_t here = std::min(count, columns - column);
+        use((static_cast<std::size_t>(where.slice[frame]) * down + row +
+             static_cast<std::size_t>(where.row[frame])) *
+                    across +
+                column + static_cast<std::size_t>(where.column[frame]),
+            here);
+        first += here;
+        count -= here;
+    }
+}
+
+// "of 'liver' and 'tumour' 123, ..." of the largest three.
+std::string pairs_text(const std::map<std::pair<int, int>, std::uint64_t>& pairs,
+                       const std::map<int, std::string>& names) {
+    std::vector<std::pair<std::uint64_t, std::pair<int, int>>> order;
+    for (const auto& [pair, voxels] : pairs) order.push_back({voxels, pair});
+    std::sort(order.rbegin(), order.rend());
+    std::string text;
+    for (std::size_t n = 0; n < std::min<std::size_t>(3, order.size()); ++n)
+        text += (n > 0 ? ", '" : "'") + names.at(order[n].second.first) + "' and '" +
+                names.at(order[n].second.second) + "' " + std::to_string(order[n].first);
+    if (order.size() > 3) text += ", and others";
+    return text;
+}
+
+template <class T>
+void paint_segments(const Object& object,
+                    const FramePlaces& where,
+                    const Pixels& pixels,
+                    int maximum,
+                    NativeVolume& volume,
+                    std::vector<Segment>& segments) {
+    T* voxels = reinterpret_cast<T*>(volume.bytes.data());
+    for (Segment& segment : segments)
+        for (const int frame : segment.frames)
+            for_frame_runs(object, pixels, maximum, frame,
+                           [&](std::size_t, std::size_t count) { segment.voxels += count; });
+    // Large segments first, so that small ones end on top; of one size the later.
+    std::vector<const Segment*> order;
+    std::map<int, std::string> names;
+    for (const Segment& segment : segments) {
+        order.push_back(&segment);
+        names[segment.number] = segment.name;
+    }
+    std::stable_sort(order.begin(), order.end(),
+                     [](const Segment* a, const Segment* b) { return a->voxels > b->voxels; });
+    std::map<std::pair<int, int>, std::uint64_t> pairs;
+    std::uint64_t overlaps = 0, twice = 0;
+    for (const Segment* segment : order) {
+        const T value = static_cast<T>(segment->number);
+        for (const int frame : segment->frames) {
+            const auto n = static_cast<std::size_t>(frame);
+            for_frame_runs(object, pixels, maximum, frame, [&](std::size_t first, std::size_t all) {
+                for_rows(object, where, n, first, all, [&](std::size_t at, std::size_t count) {
+                    for (std::size_t v = at; v < at + count; ++v) {
+                        if (voxels[v] == value) {
+                            ++twice;
+                        } else if (voxels[v] != 0) {
+                            ++overlaps;
+                            ++pairs[{std::min<int>(voxels[v], value),
+                                     std::max<int>(voxels[v], value)}];
+                        }
+                        voxels[v] = value;
+                    }
+                });
+            });
+        }
+    }
+    if (overlaps > 0)
+        volume.warnings.push_back(std::to_string(overlaps) +
+                                  " voxels lie in more than one segment (" +
+                                  pairs_text(pairs, names) + ") and went to the smaller one");
+    if (twice > 0)
+        volume.warnings.push_back(std::to_string(twice) +
+                                  " voxels are given twice for one segment, by several frames in "
+                                  "one place: all of them together were taken; is this a series in "
+                                  "time?");
+}
+
+template <class Pixel, class T>
+void paint_labelmap(const Object& object,
+                    const FramePlaces& where,
+                    const Pixels& pixels,
+                    NativeVolume& volume,
+                    std::map<int, std::uint64_t>& counts) {
+    // The value of the background is 0, or another one that the header names.
+    const int padding = short_of(object.set(), kPadding);
+    T* voxels = reinterpret_cast<T*>(volume.bytes.data());
+    std::uint64_t twice = 0;
+    for (std::size_t frame = 0; frame < object.frames.size(); ++frame) {
+        const std::uint8_t* from = pixels.bytes + frame * pixels.frame_step * sizeof(Pixel);
+        for_rows(object, where, frame, 0, object.frame_pixels(),
+                 [&](std::size_t at, std::size_t count) {
+                     for (std::size_t v = at; v < at + count; ++v, from += sizeof(Pixel)) {
+                         Pixel value = 0;
+                         std::memcpy(&value, from, sizeof value);
+                         if (value == 0 || value == padding) continue;
+                         if (voxels[v] != 0) ++twice;
+                         voxels[v] = value;
+                     }
+                 });
+    }
+    for (std::size_t v = 0, end = where.grid.voxel_count(); v < end;) {
+        const T value = voxels[v];
+        const std::size_t first = v;
+        while (v < end && voxels[v] == value) ++v;
+        if (value != 0) counts[value] += v - first;
+    }
+    if (twice > 0)
+        volume.warnings.push_back(
+            std::to_string(twice) +
+            " voxels are given by more than one frame and went to the later; is this a series in "
+            "time?");
+}
+
+// Gives each frame of a BINARY or FRACTIONAL object to its segment.
+Status assign_frames(Object& object, const std::string& path, std::vector<std::string>& warnings) {
+    for (std::size_t n = 0; n < object.frames.size(); ++n) {
+        int number = object.frames[n].segment;
+        if (number == 0 && object.segments.size() == 1) number = object.segments.front().number;
+        if (number == 0)
+            return Error{frame_text(n) + " belongs to no segment", path,
+                         "expected SegmentIdentificationSequence: " + std::string(kAgain)};
+        auto found = std::find_if(object.segments.begin(), object.segments.end(),
+                                  [&](const Segment& s) { return s.number == number; });
+        if (found == object.segments.end()) {
+            Segment segment;
+            segment.number = number;
+            segment.name = "segment_" + std::to_string(number);
+            warnings.push_back("frames belong to segment " + std::to_string(number) +
+                               ", which the DICOM segmentation does not name");
+            object.segments.push_back(std::move(segment));
+            found = object.segments.end() - 1;
+        }
+        found->frames.push_back(static_cast<int>(n));
+    }
+    return Done{};
+}
+
+// Segments of a label map that its header does not name.
+void name_values(const std::map<int, std::uint64_t>& counts,
+                 std::vector<Segment>& segments,
+                 std::vector<std::string>& warnings) {
+    std::string unnamed;
+    for (const auto& [value, voxels] : counts) {
+        auto found = std::find_if(segments.begin(), segments.end(),
+                                  [v = value](const Segment& s) { return s.number == v; });
+        if (found == segments.end()) {
+            Segment segment;
+            segment.number = value;
+            segment.name = "segment_" + std::to_string(value);
+            unnamed += (unnamed.empty() ? "" : ", ") + std::to_string(value);
+            segments.push_back(std::move(segment));
+            found = segments.end() - 1;
+        }
+        found->voxels = voxels;
+    }
+    if (!unnamed.empty())
+        warnings.push_back("the DICOM segmentation holds the values " + unnamed +
+                           ", which it does not name: give a table of value,name");
+}
+
+void add_fields(const Object& object, const std::string& path, NativeVolume& volume) {
+    int field = 0;
+    std::string codes, empty;
+    for (const Segment& segment : object.segments) {
+        if (segment.voxels == 0) {
+            if (segment.number > 0) empty += (empty.empty() ? "'" : ", '") + segment.name + "'";
+            continue;
+        }
+        const std::string prefix = "Segment" + std::to_string(field++) + "_";
+        volume.fields[prefix + "Name"] = segment.name;
+        volume.fields[prefix + "LabelValue"] = std::to_string(segment.number);
+        volume.fields[prefix + "Layer"] = "0";
+        if (!segment.colour.empty()) volume.fields[prefix + "Color"] = segment.colour;
+        if (!segment.code.empty())
+            codes += (codes.empty() ? "" : "; ") + segment.name + ": " + segment.code +
+                     (segment.modifier.empty() ? "" : ", " + segment.modifier);
+    }
+    const Vector3 spacing = volume.grid.spacing_mm;
+    const char* kind = object.kind == Kind::binary       ? "BINARY"
+                       : object.kind == Kind::fractional ? "FRACTIONAL"
+                                                         : "LABELMAP";
+    volume.notes.insert(
+        volume.notes.begin(),
+        {"source", text("DICOM segmentation %s, %s, %d segments in %zu frames; spacing of %.4g x "
+                        "%.4g x %.4g mm and places from its functional groups",
+                        std::filesystem::path(path).filename().c_str(), kind, field,
+                        object.frames.size(), spacing.x, spacing.y, spacing.z)});
+    if (!codes.empty()) volume.notes.push_back({"codes", codes});
+    if (!empty.empty())
+        volume.warnings.push_back("segments without a voxel are left out: " + empty);
+}
+
+Result<NativeVolume> read_object(const std::string& path,
+                                 double scan_step_mm,
+                                 bool resample_shear) {
+    Object object;
+    SONOCASE_TRY_DONE(read_header(path, object));
+    NativeVolume volume;
+    SONOCASE_TRY(auto where, place_frames(object, scan_step_mm, resample_shear, path));
+    volume.grid = where.grid;
+    volume.notes = std::move(where.notes);
+    volume.warnings = std::move(where.warnings);
+    if (object.kind != Kind::labelmap) {
+        SONOCASE_TRY_DONE(assign_frames(object, path, volume.warnings));
+    }
+    tell_apart(object.segments, volume.warnings);
+    Pixels pixels;
+    SONOCASE_TRY_DONE(read_pixels(object, path, pixels, volume.warnings));
+
+    int largest = object.bits == 16 ? 65535 : 255;
+    if (object.kind != Kind::labelmap) {
+        largest = 0;
+        for (const Segment& segment : object.segments) largest = std::max(largest, segment.number);
+    }
+    volume.component = largest > 255 ? Component::u16 : Component::u8;
+    const std::uint64_t bytes = volume.grid.voxel_count() * (largest > 255 ? 2 : 1);
+    const double mb = static_cast<double>(bytes + volume.grid.voxel_count()) / 1e6;
+    if (mb > memory_limit_mb())
+        return Error{
+            text("its %.0f million voxels take %.0f MB, and there are %.0f MB",
+                 static_cast<double>(volume.grid.voxel_count()) / 1e6, mb, memory_limit_mb()),
+            path, "a coarser or cropped segmentation, or more memory"};
+    volume.bytes.resize(bytes);
+    if (object.kind == Kind::labelmap) {
+        std::map<int, std::uint64_t> counts;
+        if (object.bits == 8)
+            paint_labelmap<std::uint8_t, std::uint8_t>(object, where, pixels, volume, counts);
+        else
+            paint_labelmap<std::uint16_t, std::uint16_t>(object, where, pixels, volume, counts);
+        name_values(counts, object.segments, volume.warnings);
+    } else {
+        int maximum = short_of(object.set(), kMaximum);
+        if (object.kind == Kind::fractional) {
+            const std::string type = text_of(object.set(), kFractionalType);
+            if (maximum < 1 || maximum > 255) {
+                volume.warnings.push_back(
+                    "the FRACTIONAL segmentation names no MaximumFractionalValue: 255 was taken");
+                maximum = 255;
+            }
+            volume.notes.push_back(
+                {"fractional", "a voxel is inside from " + std::to_string((maximum + 1) / 2) +
+                                   " of " + std::to_string(maximum) + " on, half of the " +
+                                   (type == "OCCUPANCY" ? "voxel" : "probability")});
+        }
+        auto& segments = object.segments;
+        if (largest > 255)
+            paint_segments<std::uint16_t>(object, where, pixels, maximum, volume, segments);
+        else
+            paint_segments<std::uint8_t>(object, where, pixels, maximum, volume, segments);
+    }
+    add_fields(object, path, volume);
+    return volume;
+}
+
+}  // namespace
+
+Result<FrameLattice> lattice_of(const std::vector<double>& places,
+                                const DicomFrame& frame,
+                                double scan_step_mm,
+                                const std::string& path) {
+    FrameLattice lattice;
+    lattice.slices = 1;
+    std::vector<double> sorted = places;
+    std::sort(sorted.begin(), sorted.end());
+    const double between = frame.between_mm, thickness = frame.thickness_mm;
+    // Frames nearer than this are in one place; segments of one slice are.
+    const double hint = between > 0 ? between : thickness > 0 ? thickness : 1;
+    const double same = std::clamp(0.01 * hint, 1e-4, 0.05);
+    std::vector<double> gaps;
+    for (std::size_t n = 1; n < sorted.size(); ++n)
+        if (const double gap = sorted[n] - sorted[n - 1]; gap > same) gaps.push_back(gap);
+    if (gaps.empty()) {
+        lattice.step_mm = scan_step_mm > 0 ? scan_step_mm : between > 0 ? between : thickness;
+        if (!(lattice.step_mm > 0))
+            return Error{"one slice that does not say how thick it is", path,
+                         "expected SliceThickness or SpacingBetweenSlices"};
+        lattice.slice.assign(places.size(), 0);
+        return lattice;
+    }
+    std::sort(gaps.begin(), gaps.end());
+    // The step near `guess` of which every gap is a multiple; 0: there is none. The more gaps, the
+    // less rounding of the positions counts.
+    bool all_apart = false;  // no two frames are neighbours
+    const auto step_near = [&](double guess) {
+        if (!(guess > 0)) return 0.0;
+        double sum = 0, steps = 0, step = guess;
+        all_apart = true;
+        for (const double gap : gaps) {
+            const double times = std::round(gap / step);
+            if (times < 1 || std::abs(gap / step - times) > std::max(0.05, 0.02 / step)) return 0.0;
+            all_apart = all_apart && times > 1;
+            sum += gap;
+            steps += times;
+            step = sum / steps;
+        }
+        return step;
+    };
+    const char* source = "";
+    for (const auto& [guess, name] :
+         {std::pair{between, "SpacingBetweenSlices"}, std::pair{scan_step_mm, "the scan"},
+          std::pair{gaps.front(), "their least distance"}}) {
+        lattice.step_mm = step_near(guess);
+        source = name;
+        if (lattice.step_mm > 0) break;
+    }
+    // Organs are whole: frames that are as thick as they lie apart, lie as those of the scan do, or
+    // lie evenly throughout, leave nothing out.
+    const auto is_gap = [&](double mm) { return std::abs(mm / gaps.front() - 1) < 0.01; };
+    const bool even = gaps.size() >= 3 && is_gap(gaps.back()) && !(scan_step_mm > 0);
+    if (lattice.step_mm > 0 && all_apart && (is_gap(thickness) || is_gap(scan_step_mm) || even)) {
+        const double smaller = lattice.step_mm;
+        lattice.step_mm = step_near(gaps.front());
+        if (!(lattice.step_mm > 0)) lattice.step_mm = step_near(smaller);
+    }
+    const double step = lattice.step_mm;
+    if (!(step > 0))
+        return Error{text("frames are unevenly spaced: gaps from %.4g to %.4g mm are no multiples "
+                          "of one step",
+                          gaps.front(), gaps.back()),
+                     path, "resample the segmentation to one grid"};
+    if (between > 0 && std::abs(between / step - 1) > 0.01)
+        lattice.warnings.push_back(
+            text("the frames of the DICOM segmentation lie %.4g mm apart by their positions, and "
+                 "%.4g mm by SpacingBetweenSlices: the positions were taken",
+                 step, between));
+    else if (!(between > 0) && thickness > 0 && std::abs(thickness / step - 1) > 0.01)
+        lattice.warnings.push_back(
+            text("the frames of the DICOM segmentation lie %.4g mm apart (by %s), and are %.4g mm "
+                 "thick: check that none is missing",
+                 step, source, thickness));
+    if (all_apart && gaps.size() > 1)
+        lattice.warnings.push_back(
+            text("no two frames of the DICOM segmentation are neighbours: they lie %.4g mm apart "
+                 "and more where %s says %.4g; what lies between is outside the body",
+                 gaps.front(), source, step));
+    const double height = (sorted.back() - sorted.front()) / step;
+    if (!(height < 65535))
+        return Error{text("frames lie %.4g mm apart, on a step of %.4g mm",
+                          sorted.back() - sorted.front(), step),
+                     path, "expected a torso: check the positions of the frames"};
+    lattice.slices = static_cast<int>(std::lround(height)) + 1;
+    for (const double place : places) {
+        const double at = (place - sorted.front()) / step;
+        if (std::abs(at - std::round(at)) > 0.1)
+            return Error{text("frames are unevenly spaced: one lies %.3g mm off its place",
+                              std::abs(at - std::round(at)) * step),
+                         path, "resample the segmentation to one grid"};
+        lattice.slice.push_back(static_cast<int>(std::lround(at)));
+    }
+    return lattice;
+}
+
+Result<NativeVolume> read_dicom_segmentation(const std::string& path,
+                                             double scan_step_mm,
+                                             bool resample_shear) {
+    const QuietLibrary quiet;
+    try {
+        return read_object(path, scan_step_mm, resample_shear);
+    } catch (const std::exception&) {
+        return Error{"cannot be read as a DICOM segmentation: the file is damaged", path,
+                     "copy it or export it again"};
+    }
+}
+
+VolumeSize size_in_segmentation(const std::string& path) {
+    const QuietLibrary quiet;
+    try {
+        Object object;
+        if (!read_header(path, object)) return {};
+        const auto where = place_frames(object, 0, true, path);
+        if (!where) return {};
+        const std::uint64_t voxels = where->grid.voxel_count();
+        return {voxels, voxels * (object.bits == 16 ? 2 : 1), where->grid.spacing_mm};
+    } catch (const std::exception&) {  // reading the voxels will report it
+        return {};
+    }
+}
+
+}  // namespace sonocase::pipeline::inline import_volume

@@ -1,0 +1,441 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Where the voxels lie: every number of a header is read, checked and compared before it counts.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "pipeline/import/volume/label_map.h"
+#include "support/temporary_folder.h"
+#include "three_boxes.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using testing::TemporaryFolder;
+using testing::TinyVolume;
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInf = std::numeric_limits<float>::infinity();
+
+template <class T>
+void put(std::string& bytes, std::size_t at, T value) {
+    std::memcpy(bytes.data() + at, &value, sizeof value);
+}
+
+// The table that names the boxes, so that nothing is said of names.
+ImportOptions named(const TemporaryFolder& folder) {
+    ImportOptions options;
+    options.table = folder.write("names.csv", "1,spleen\n2,kidney_right\n5,liver\n");
+    return options;
+}
+
+bool says(const Result<ImportedLabels>& imported, const std::string& words) {
+    for (const std::string& warning : imported->report.warnings)
+        if (warning.find(words) != std::string::npos) return true;
+    return false;
+}
+
+// How many voxels carry another label than the body, moved, has at their place.
+std::size_t wrong_voxels(const Result<ImportedLabels>& imported,
+                         Vector3 moved = {},
+                         double within_mm = 0) {
+    if (!imported) {
+        ADD_FAILURE() << std::string(imported.error().message());
+        return 0;
+    }
+    const LabelVolume& labels = imported->labels;
+    std::size_t n = 0, wrong = 0;
+    for (int k = 0; k < labels.grid.size.z; ++k)
+        for (int j = 0; j < labels.grid.size.y; ++j)
+            for (int i = 0; i < labels.grid.size.x; ++i, ++n) {
+                const Point3 p = labels.grid.point_from_voxel({double(i), double(j), double(k)});
+                bool right = false;
+                for (int corner = 0; corner < 27 && !right; ++corner) {
+                    const Vector3 off{within_mm * (corner % 3 - 1),
+                                      within_mm * (corner / 3 % 3 - 1),
+                                      within_mm * (corner / 9 - 1)};
+                    right = labels.labels[labels.voxels[n]].source_value ==
+                            shifted_body(p - moved + off);
+                }
+                wrong += !right;
+            }
+    return wrong;
+}
+
+void expect_refused(const Result<ImportedLabels>& imported, const std::string& words) {
+    ASSERT_FALSE(imported.has_value()) << words;
+    const std::string message = imported.error().message();
+    EXPECT_NE(message.find(words), std::string::npos) << message;
+    EXPECT_EQ(message.find("vnl"), std::string::npos) << message;
+    EXPECT_FALSE(imported.error().expected.empty()) << message;
+}
+
+TEST(VolumeGeometry, NumbersOfNiftiThatAreNotFiniteAreRefusedByTheirField) {
+    const TemporaryFolder folder;
+    const ImportOptions options = named(folder);
+    std::string good = testing::nifti_bytes(ras_volume());
+    put(good, 252, std::int16_t{1});  // an identity as qform as well, at the same place
+    for (int axis = 0; axis < 3; ++axis)
+        put(good, 268 + 4 * axis, static_cast<float>(ras_volume().origin[axis]));
+    ASSERT_TRUE(import_label_map(folder.write("good.nii", good), options).has_value());
+    const std::pair<std::size_t, const char*> fields[] = {
+        {80, "pixdim[1]"},  {84, "pixdim[2]"},  {88, "pixdim[3]"},  {108, "vox_offset"},
+        {256, "quatern_b"}, {264, "quatern_d"}, {268, "qoffset_x"}, {276, "qoffset_z"},
+        {280, "srow_x"},    {292, "srow_x"},    {300, "srow_y"},    {324, "srow_z"},
+    };
+    for (const auto& [at, field] : fields)
+        for (const float value : {kNaN, kInf, -kInf})
+            for (const char* name : {"a.nii", "a.nii.gz"}) {
+                std::string bytes = good;
+                put(bytes, at, value);
+                expect_refused(
+                    import_label_map(
+                        folder.write(name, name[5] == '\0' ? bytes : testing::gzip_bytes(bytes)),
+                        options),
+                    field);
+            }
+    // What no code asks for is not read.
+    std::string unused = good;
+    put(unused, 252, std::int16_t{0});
+    put(unused, 268, kNaN);
+    EXPECT_EQ(wrong_voxels(import_label_map(folder.write("u.nii", unused), options)), 0u);
+}
+
+TEST(VolumeGeometry, VoxelSizesOfNiftiThatAreNoSizesAreRefusedOrTold) {
+    const TemporaryFolder folder;
+    ImportOptions options = named(folder);
+    for (const float size : {0.0f, -2.0f}) {
+        std::string bytes = testing::nifti_bytes(ras_volume());
+        put(bytes, 80, size);
+        const auto by_sform = import_label_map(folder.write("a.nii", bytes), options);
+        EXPECT_EQ(wrong_voxels(by_sform), 0u);  // the sform has them
+        EXPECT_TRUE(says(by_sform, "pixdim[1]"));
+        put(bytes, 252, std::int16_t{1});
+        put(bytes, 254, std::int16_t{0});
+        expect_refused(import_label_map(folder.write("a.nii", bytes), options), "pixdim[1]");
+    }
+    std::string other = testing::nifti_bytes(ras_volume());
+    put(other, 84, 5.0f);  // the sform has 4
+    const auto imported = import_label_map(folder.write("o.nii", other), options);
+    EXPECT_EQ(wrong_voxels(imported), 0u);
+    EXPECT_TRUE(says(imported, "4 mm along axis 2 by the sform and 5 by pixdim"));
+    for (const int size : {0, -48}) {
+        std::string bytes = testing::nifti_bytes(ras_volume());
+        put(bytes, 42, static_cast<std::int16_t>(size));
+        expect_refused(import_label_map(folder.write("d.nii", bytes), options), "dim");
+    }
+}
+
+TEST(VolumeGeometry, SformIsTakenWhereItAndTheQformDisagreeAndTheWordIsGiven) {
+    const TemporaryFolder folder;
+    ImportOptions options = named(folder);
+    for (const int sform_code : {1, 2, 4}) {
+        for (const bool mirrored : {false, true}) {
+            std::string bytes = testing::nifti_bytes(ras_volume());
+            put(bytes, 252, std::int16_t{1});
+            put(bytes, 254, static_cast<std::int16_t>(sform_code));
+            const Vector3 moved{30, -20, 55};
+            for (int axis = 0; axis < 3; ++axis)
+                put(bytes, 268 + 4 * axis,
+                    static_cast<float>(ras_volume().origin[axis] + moved[axis]));
+            if (mirrored) {  // half a turn about y, and the z axis against it: x alone is exchanged
+                put(bytes, 260, 1.0f);
+                put(bytes, 76, -1.0f);
+            }
+            const std::string path = folder.write("a.nii", bytes);
+            options.reading.orientation = Orientation::automatic;
+            const auto automatic = import_label_map(path, options);
+            EXPECT_EQ(wrong_voxels(automatic), 0u);
+            EXPECT_TRUE(says(automatic, "mm apart")) << sform_code;
+            EXPECT_EQ(says(automatic, "right and left differ"), mirrored);
+            options.reading.orientation = Orientation::sform;
+            const auto sform = import_label_map(path, options);
+            EXPECT_EQ(wrong_voxels(sform), 0u);
+            EXPECT_FALSE(says(sform, "apart"));
+            options.reading.orientation = Orientation::qform;
+            const auto qform = import_label_map(path, options);
+            if (!mirrored)
+                EXPECT_EQ(wrong_voxels(qform, moved), 0u);
+            else
+                EXPECT_NE(wrong_voxels(qform), 0u);
+        }
+    }
+    // Within half a voxel the two agree.
+    std::string near = testing::nifti_bytes(ras_volume());
+    put(near, 252, std::int16_t{1});
+    for (int axis = 0; axis < 3; ++axis)
+        put(near, 268 + 4 * axis, static_cast<float>(ras_volume().origin[axis] + 0.5));
+    const auto imported = import_label_map(folder.write("n.nii", near), options);
+    EXPECT_TRUE(imported->report.warnings.empty());
+    // What is asked for must be there.
+    std::string none = testing::nifti_bytes(ras_volume());
+    options.reading.orientation = Orientation::qform;
+    expect_refused(import_label_map(folder.write("q.nii", none), options), "no qform");
+}
+
+TEST(VolumeGeometry, ScaledIntegersOfEveryKindAreWholeLabels) {
+    const TemporaryFolder folder;
+    const ImportOptions options = named(folder);
+    const std::string plain = testing::nifti_bytes(ras_volume());
+    const auto with = [&](int datatype, double slope, double intercept, auto one) {
+        std::string bytes = plain.substr(0, 352);
+        put(bytes, 70, static_cast<std::int16_t>(datatype));
+        put(bytes, 72, static_cast<std::int16_t>(8 * sizeof one));
+        put(bytes, 112, static_cast<float>(slope));
+        put(bytes, 116, static_cast<float>(intercept));
+        for (const std::uint8_t voxel : ras_volume().voxels) {
+            const auto stored = static_cast<decltype(one)>(
+                std::lround((voxel - static_cast<double>(static_cast<float>(intercept))) /
+                            static_cast<double>(static_cast<float>(slope))));
+            bytes.append(reinterpret_cast<const char*>(&stored), sizeof stored);
+        }
+        return import_label_map(folder.write("s.nii.gz", testing::gzip_bytes(bytes)), options);
+    };
+    EXPECT_EQ(wrong_voxels(with(2, 0.5, 0, std::uint8_t{})), 0u);
+    EXPECT_EQ(wrong_voxels(with(256, 1, 100, std::int8_t{})), 0u);
+    EXPECT_EQ(wrong_voxels(with(4, 0.5, 0, std::int16_t{})), 0u);
+    EXPECT_EQ(wrong_voxels(with(4, 1, -1024, std::int16_t{})), 0u);
+    EXPECT_EQ(wrong_voxels(with(512, 2, -8, std::uint16_t{})) != 0, true);  // odd labels are lost
+    EXPECT_EQ(wrong_voxels(with(8, 0.25, 3, std::int32_t{})), 0u);
+    // As nibabel writes labels up to 201 that are floating point into 16 bits: off by .0015.
+    EXPECT_EQ(wrong_voxels(with(4, 201.0 / 65535, 100.5, std::int16_t{})), 0u);
+    // A step of a third does not leave whole numbers.
+    std::string third = plain;
+    put(third, 112, 1 / 3.0f);
+    expect_refused(import_label_map(folder.write("t.nii", third), options), "not whole");
+    // 0 and NaN mean that nothing is scaled.
+    for (const float slope : {0.0f, kNaN}) {
+        std::string bytes = plain;
+        put(bytes, 112, slope);
+        put(bytes, 116, kNaN);
+        EXPECT_EQ(wrong_voxels(import_label_map(folder.write("z.nii", bytes), options)), 0u);
+    }
+    std::string infinite = plain;
+    put(infinite, 112, kInf);
+    expect_refused(import_label_map(folder.write("i.nii", infinite), options), "scl_slope");
+}
+
+TEST(VolumeGeometry, NamesOfFilesDoNotDecideHowTheyArePacked) {
+    const TemporaryFolder folder;
+    const ImportOptions options = named(folder);
+    const std::string nifti = testing::nifti_bytes(ras_volume()),
+                      packed = testing::gzip_bytes(nifti);
+    for (const auto& [name, bytes] : {std::pair{"A.NII.GZ", packed},
+                                      {"b.nii", packed},
+                                      {"c.nii.gz", nifti},
+                                      {"D.Nii", nifti},
+                                      {"E.NRRD", testing::nrrd_bytes(ras_volume())},
+                                      {"F.MHA", testing::mha_bytes(ras_volume())}})
+        EXPECT_EQ(wrong_voxels(import_label_map(folder.write(name, bytes), options)), 0u) << name;
+}
+
+// Every number of a NIfTI-1 header that the reader uses, in the layout of NIfTI-2.
+std::string nifti2_bytes(const TinyVolume& volume) {
+    std::string bytes(544, '\0');
+    put(bytes, 0, std::int32_t{540});
+    std::memcpy(bytes.data() + 4, "n+2\0\r\n\032\n", 8);
+    put(bytes, 12, std::int16_t{2});
+    put(bytes, 14, std::int16_t{8});
+    const std::int64_t dim[8] = {3, volume.size.x, volume.size.y, volume.size.z, 1, 1, 1, 1};
+    std::memcpy(bytes.data() + 16, dim, sizeof dim);
+    put(bytes, 104, 1.0);
+    for (int axis = 0; axis < 3; ++axis)
+        put(bytes, 112 + 8 * axis, norm(volume.columns.column(axis)));
+    put(bytes, 168, std::int64_t{544});
+    put(bytes, 348, std::int32_t{2});
+    put(bytes, 500, std::int32_t{2});
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column)
+            put(bytes, 400 + 32 * row + 8 * column, volume.columns(row, column));
+        put(bytes, 424 + 32 * row, volume.origin[row]);
+    }
+    return bytes + std::string(volume.voxels.begin(), volume.voxels.end());
+}
+
+TEST(VolumeGeometry, SecondVersionOfNiftiIsReadAsTheFirst) {
+    const TemporaryFolder folder;
+    const ImportOptions options = named(folder);
+    const std::string bytes = nifti2_bytes(ras_volume());
+    EXPECT_EQ(wrong_voxels(import_label_map(folder.write("a.nii", bytes), options)), 0u);
+    EXPECT_EQ(wrong_voxels(
+                  import_label_map(folder.write("a.nii.gz", testing::gzip_bytes(bytes)), options)),
+              0u);
+    std::string broken = bytes;
+    put(broken, 432, std::numeric_limits<double>::quiet_NaN());
+    expect_refused(import_label_map(folder.write("b.nii", broken), options), "srow_y");
+}
+
+TEST(VolumeGeometry, HeaderThatIsNoNiftiIsRefused) {
+    const TemporaryFolder folder;
+    const ImportOptions options = named(folder);
+    std::string bytes = testing::nifti_bytes(ras_volume());
+    bytes.replace(344, 4, std::string(4, '\0'));
+    expect_refused(import_label_map(folder.write("a.nii", bytes), options), "ANALYZE");
+    bytes.replace(344, 4, std::string("ni1\0", 4));
+    expect_refused(import_label_map(folder.write("p.nii", bytes), options), "pair of files");
+    expect_refused(import_label_map(folder.write("t.nii", "a text"), options), "NIfTI header");
+    std::string colour = testing::nifti_bytes(ras_volume());
+    put(colour, 70, std::int16_t{128});
+    expect_refused(import_label_map(folder.write("c.nii", colour), options), "datatype");
+}
+
+TEST(VolumeGeometry, UnitsOfTheHeaderCountWhereTheyMakeABody) {
+    const TemporaryFolder folder;
+    const ImportOptions options = named(folder);
+    TinyVolume metres = ras_volume();
+    for (double& entry : metres.columns.m) entry *= 0.001;
+    for (int axis = 0; axis < 3; ++axis) metres.origin[axis] *= 0.001;
+    std::string bytes = testing::nifti_bytes(metres);
+    bytes[123] = 1;
+    const auto imported = import_label_map(folder.write("m.nii", bytes), options);
+    EXPECT_EQ(wrong_voxels(imported, {}, 1e-3), 0u);
+    EXPECT_TRUE(says(imported, "metres"));
+    // The unit alone is wrong.
+    bytes = testing::nifti_bytes(ras_volume());
+    bytes[123] = 1;
+    const auto wrong = import_label_map(folder.write("w.nii", bytes), options);
+    EXPECT_EQ(wrong_voxels(wrong), 0u);
+    EXPECT_TRUE(says(wrong, "taken as millimetres"));
+}
+
+TEST(VolumeGeometry, NumbersOfTextHeadersThatAreNotFiniteAreRefusedByTheirField) {
+    const TemporaryFolder folder;
+    const ImportOptions options = named(folder);
+    const auto with = [&](const char* name, std::string bytes, const std::string& from,
+                          const std::string& to) {
+        const std::size_t at = bytes.find(from);
+        EXPECT_NE(at, std::string::npos) << from;
+        return import_label_map(folder.write(name, bytes.replace(at, from.size(), to)), options);
+    };
+    const std::string nrrd = testing::nrrd_bytes(ras_volume()),
+                      mha = testing::mha_bytes(ras_volume());
+    for (const char* value : {"nan", "inf", "-inf", "x"}) {
+        const std::string v(value);
+        expect_refused(with("a.nrrd", nrrd, "(-2,", "(" + v + ","), "space directions");
+        expect_refused(with("a.nrrd", nrrd, "space origin: (20", "space origin: (" + v),
+                       "space origin");
+        expect_refused(with("a.nrrd", nrrd, "sizes: 48", "sizes: " + v), "sizes");
+        expect_refused(with("a.mha", mha, "ElementSpacing = 2", "ElementSpacing = " + v),
+                       "ElementSpacing");
+        expect_refused(with("a.mha", mha, "Offset = 20", "Offset = " + v), "Offset");
+        expect_refused(with("a.mha", mha, "TransformMatrix = -1", "TransformMatrix = " + v),
+                       "TransformMatrix");
+        expect_refused(with("a.mha", mha, "DimSize = 48", "DimSize = " + v), "DimSize");
+    }
+    expect_refused(with("a.mha", mha, "ElementSpacing = 2", "ElementSpacing = 0"),
+                   "ElementSpacing");
+    expect_refused(with("a.mha", mha, "TransformMatrix = -1", "TransformMatrix = -2"), "length 2");
+    expect_refused(with("a.nrrd", nrrd, "(-2,", "(0,"), "0 mm along axis 1");
+}
+
+TEST(VolumeGeometry, EverySpaceOfNrrdIsTurnedToThePatient) {
+    const TemporaryFolder folder;
+    const ImportOptions options = named(folder);
+    const std::string ras = testing::nrrd_bytes(ras_volume(), "", /*lps=*/false);
+    const auto with = [&](const std::string& space, Vector3 sign) {
+        TinyVolume volume = ras_volume();
+        for (int row = 0; row < 3; ++row) {
+            for (int column = 0; column < 3; ++column) volume.columns(row, column) *= sign[row];
+            volume.origin[row] *= sign[row];
+        }
+        std::string bytes = testing::nrrd_bytes(volume, "", /*lps=*/false);
+        const std::string old = "space: right-anterior-superior\n";
+        bytes.replace(bytes.find(old), old.size(), space);
+        return import_label_map(folder.write("a.nrrd", bytes), options);
+    };
+    EXPECT_EQ(wrong_voxels(with("space: RAS\n", {1, 1, 1})), 0u);
+    EXPECT_EQ(wrong_voxels(with("space: left-anterior-superior\n", {-1, 1, 1})), 0u);
+    EXPECT_EQ(wrong_voxels(with("space: LPS\n", {-1, -1, 1})), 0u);
+    const auto unknown = with("space dimension: 3\n", {-1, -1, 1});
+    EXPECT_EQ(wrong_voxels(unknown), 0u);
+    EXPECT_TRUE(says(unknown, "right and left may be exchanged"));
+    const auto metres = with("space: LPS\nspace units: \"m\" \"m\" \"m\"\n", {-1, -1, 1});
+    ASSERT_FALSE(metres.has_value());  // a body of 96 m
+    EXPECT_NE(metres.error().expected.find("--scale"), std::string::npos);
+}
+
+TEST(VolumeGeometry, SlightShearIsSquaredOffAndMoreIsResampledOnRequest) {
+    const TemporaryFolder folder;
+    ImportOptions options = named(folder);
+    TinyVolume volume = ras_volume();
+    volume.columns(1, 2) = 0.005 * volume.columns(2, 2);  // 0.11 mm over 45 mm, voxels of 2 mm
+    const auto slight =
+        import_label_map(folder.write("s.nii", testing::nifti_bytes(volume)), options);
+    EXPECT_EQ(wrong_voxels(slight, {}, 0.2), 0u);
+    EXPECT_TRUE(says(slight, "squared off"));
+    // A gantry tilted by 17 degrees: the body sampled along the slanted axes.
+    const TinyVolume plain = ras_volume();
+    Matrix3 slanted = plain.columns;
+    slanted(1, 2) = 0.3 * slanted(2, 2);
+    const TinyVolume tilted =
+        testing::sample({48, 24, 16}, slanted, plain.origin - Vector3{0, 16, 0}, shifted_body);
+    options.reading.resample_shear = true;
+    for (const auto& [name, bytes] : {std::pair{"t.nii", testing::nifti_bytes(tilted)},
+                                      {"t.nrrd", testing::nrrd_bytes(tilted)}}) {
+        const auto resampled = import_label_map(folder.write(name, bytes), options);
+        // The nearest voxel is at most half a voxel away along each slanted axis.
+        EXPECT_EQ(wrong_voxels(resampled, {}, 2.5), 0u) << name;
+        EXPECT_TRUE(says(resampled, "resampled"));
+    }
+}
+
+// As programs write them that crop each structure to its box.
+TEST(VolumeGeometry, MasksCroppedToTheirBoxesAreJoinedOnTheirLattice) {
+    const TemporaryFolder folder;
+    const TinyVolume whole = ras_volume();
+    for (const auto& [name, value, shift] :
+         {std::tuple{"kidney_right", 2, 0.0}, {"liver", 5, 0.15}, {"spleen", 1, -0.1}}) {
+        Int3 low = whole.size, high{-1, -1, -1};
+        std::size_t n = 0;
+        for (int k = 0; k < whole.size.z; ++k)
+            for (int j = 0; j < whole.size.y; ++j)
+                for (int i = 0; i < whole.size.x; ++i, ++n)
+                    if (whole.voxels[n] == value) {
+                        low = {std::min(low.x, i), std::min(low.y, j), std::min(low.z, k)};
+                        high = {std::max(high.x, i), std::max(high.y, j), std::max(high.z, k)};
+                    }
+        // Off the lattice by less than a tenth of a voxel, as sums of rounded numbers are.
+        const TinyVolume mask =
+            testing::sample({high.x - low.x + 1, high.y - low.y + 1, high.z - low.z + 1},
+                            whole.columns, whole.position(low.x, low.y, low.z),
+                            [value = value](Point3 p) { return shifted_body(p) == value ? 1 : 0; });
+        TinyVolume moved = mask;
+        moved.origin.x += shift;
+        folder.write(std::string("m/") + name + ".nii", testing::nifti_bytes(moved));
+    }
+    const auto imported = import_label_map(folder / "m");
+    EXPECT_EQ(wrong_voxels(imported), 0u);
+    EXPECT_EQ(imported->labels.labels.size(), 4u);
+    // What is said of a map is said of a mask as well.
+    std::string bytes = testing::nifti_bytes(ras_volume());
+    for (std::size_t v = 352; v < bytes.size(); ++v) bytes[v] = bytes[v] == kLiver;
+    put(bytes, 254, std::int16_t{0});
+    folder.write("n/liver.nii", bytes);
+    const auto lost = import_label_map(folder / "n");
+    ASSERT_TRUE(lost.has_value());
+    EXPECT_TRUE(says(lost, "liver.nii: the file does not say how its axes lie"));
+}
+
+TEST(VolumeGeometry, ChannelsOfZeroAndOneAreOneStructureEach) {
+    const TemporaryFolder folder;
+    ImportOptions options = named(folder);
+    const auto channels = [&](bool background, int highest) {
+        std::string bytes = testing::nifti_bytes(ras_volume()).substr(0, 352);
+        put(bytes, 40, std::int16_t{4});
+        put(bytes, 48, static_cast<std::int16_t>(background ? 6 : 5));
+        for (int c = background ? 0 : 1; c <= 5; ++c)
+            for (const std::uint8_t voxel : ras_volume().voxels)
+                bytes += static_cast<char>(voxel == c ? highest : 0);
+        return import_label_map(folder.write("c.nii", bytes), options);
+    };
+    EXPECT_EQ(wrong_voxels(channels(true, 1)), 0u);
+    EXPECT_EQ(wrong_voxels(channels(false, 1)), 0u);
+    EXPECT_TRUE(says(channels(true, 1), "channels"));
+    expect_refused(channels(true, 7), "channels whose values are not 0 and 1");
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline
