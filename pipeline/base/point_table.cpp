@@ -70,11 +70,13 @@ class Cells {
                 at = end + 1;
             }
         }
+        given_ = views_.size();
         while (!views_.empty() && views_.back().empty()) views_.pop_back();
         comma_is_point_ = separator != ',';
     }
 
-    std::size_t size() const { return views_.size(); }
+    std::size_t size() const { return views_.size(); }  // without empty ones at the end
+    std::size_t given() const { return given_; }        // with them
     std::string_view operator[](std::size_t n) const {
         return n < views_.size() ? views_[n] : std::string_view();
     }
@@ -98,6 +100,7 @@ class Cells {
   private:
     std::vector<std::string_view> views_;
     std::vector<std::string> owned_;
+    std::size_t given_ = 0;
     bool comma_is_point_ = false;
 };
 
@@ -298,7 +301,7 @@ Result<std::optional<Columns>> columns_named(const std::vector<Line>& lines,
                      "call those of the position x, y and z and the others something else"};
     Columns columns;
     columns.named = true;
-    columns.count = cells.size();
+    columns.count = cells.given();  // OptiTrack leaves the last name empty
     auto of = heading.of[kinds[0]];
     if ((of[0].size() > 1 || of[1].size() > 1 || of[2].size() > 1) &&
         !narrow_by_groups(lines, at, separator, of))

@@ -142,11 +142,10 @@ TEST(PointTable, RefusesNamesThatAreNotCertain) {
     EXPECT_NE(refusal("Frame,Time,X,Y,Z,W,X,Y,Z,\n" + rows("0,0,0,.1,.2,.9,", ",.1", ","))
                   .find("Two have the same name"),
               std::string::npos);
-    // The advice: others get names of their own.
-    expect_places(
-        parse_point_table("Frame,Time,qx,qy,qz,qw,X,Y,Z,e\n" + rows("0,0,0,.1,.2,.9,", ",.1", ","),
-                          "a"),
-        "renamed");
+    // The advice: others get names of their own; the last may have none.
+    expect_places(parse_point_table(
+                      "Frame,Time,qx,qy,qz,qw,X,Y,Z,\n" + rows("0,0,0,.1,.2,.9,", ",.1", ","), "a"),
+                  "renamed");
     EXPECT_NE(refusal("x,y,z,tx,ty,tz\n1,2,3,4,5,6\n").find("Several could be"), std::string::npos);
     EXPECT_NE(refusal("x,y,z\n1,5,2,5,3,5\n").find("6 cells under 3 names"), std::string::npos);
     EXPECT_NE(refusal("x_mm,y_cm,z_mm\n1,2,3\n").find("different units"), std::string::npos);
@@ -175,6 +174,12 @@ TEST(PointTable, ReadsOptiTracksBody) {
     expect_places(table, "Motive");
     EXPECT_EQ(table->unit_mm, 1000);
     EXPECT_EQ(table->left_out, 1u);
+    // Without markers; the mean error has no name.
+    expect_places(parse_point_table(",,Rotation,Rotation,Rotation,Rotation,Position,Position,"
+                                    "Position,Mean Marker Error\nFrame,Time,X,Y,Z,W,X,Y,Z,\n" +
+                                        rows("%n,0.%n,0,0,0,1,", ",0.002", ","),
+                                    "a"),
+                  "one body");
 }
 
 TEST(PointTable, LeavesMissedReadingsOutAndCountsThem) {
