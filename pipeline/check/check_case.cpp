@@ -221,7 +221,11 @@ class Anatomy {
             for (int j = 0; j < bundle_.grid.size.y; ++j)
                 for (int i = 0; i < bundle_.grid.size.x; ++i)
                     volume.voxels.push_back(bundle_.label_bricks.at(i, j, k));
-        for (const AnatomyFinding& f : check_anatomy(summarise_body(volume, ct_from_grid)).findings)
+        // The map bends the body, and where the label map ended is no longer known.
+        AnatomyOptions options;
+        options.margin = 10;
+        const AnatomyReport report = check_anatomy(summarise_body(volume, ct_from_grid), options);
+        for (const AnatomyFinding& f : report.findings)
             result_.remarks.push_back("anatomy: " + f.text);
     }
 
