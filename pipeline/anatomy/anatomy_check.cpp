@@ -802,9 +802,9 @@ class Check {
             AnatomyFinding f;
             f.cause = AnatomyCause::volumes;
             f.error = impossible;
-            f.text = "no body has a " + large +
-                     ": names of another table, or a wrong unit; give the --table that belongs to "
-                     "the map, --names none, or --scale";
+            f.text = "larger than in any body: " + large +
+                     "; the names are another table's, or the unit is wrong: give the --table that "
+                     "belongs to the map, --names none, or --scale";
             report.findings.push_back(f);
         } else if (3 * too_small > known() && too_small >= 2) {
             AnatomyFinding f;

@@ -10,6 +10,7 @@
 #include "formats/exercise/exercise.h"
 #include "formats/text/json_reader.h"
 #include "formats/text/nearest_name.h"
+#include "pipeline/anatomy/anatomy_check.h"
 #include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/base/text.h"
 #include "pipeline/check/aim.h"
@@ -76,6 +77,7 @@ class Anatomy {
         ribs();
         misnamed_organs();
         names();
+        places();
     }
 
   private:
@@ -201,6 +203,30 @@ class Anatomy {
                  text("the body has %.2f litres and is %.0f mm long", body_l, longest) +
                      (small + large >= 4 ? "; its organs have volumes that no adult has" : ""),
                  "expected mm: check the unit of the label map and the mannequin (scale)"});
+    }
+
+    // Places, names and sizes against the model of a torso, in the axes that organs show. What import
+    // warned of is said by its report.
+    void places() {
+        if (!(norm(result_.up) > 0)) return;
+        for (const StageReport& report : bundle_.manifest.stages)
+            for (const std::string& warning : report.warnings)
+                if (warning.starts_with("anatomy: ")) return;
+        const Vector3 right = cross(result_.forwards, result_.up);
+        const Matrix3 ct_from_grid =
+            transpose(Matrix3::from_columns(right, result_.forwards, result_.up));
+        LabelVolume volume{bundle_.grid, {}, bundle_.labels};
+        volume.voxels.reserve(bundle_.grid.voxel_count());
+        for (int k = 0; k < bundle_.grid.size.z; ++k)
+            for (int j = 0; j < bundle_.grid.size.y; ++j)
+                for (int i = 0; i < bundle_.grid.size.x; ++i)
+                    volume.voxels.push_back(bundle_.label_bricks.at(i, j, k));
+        // The map bends the body, and where the label map ended is no longer known.
+        AnatomyOptions options;
+        options.margin = 10;
+        const AnatomyReport report = check_anatomy(summarise_body(volume, ct_from_grid), options);
+        for (const AnatomyFinding& f : report.findings)
+            result_.remarks.push_back("anatomy: " + f.text);
     }
 
     bool is_lesion(const std::string& name) const {

@@ -233,8 +233,9 @@ Result<ImportedLabels> import_inputs(const Recipe& recipe,
     const auto odd =
         report_anatomy(imported.labels, {.mesh = is_mesh_source(path)}, imported.report);
     if (odd && given.anatomy != "accept")
-        return Error{"this is no human body: " + *odd, path,
-                     "if it is one, give --anatomy accept, or anatomy = \"accept\" in [import]"};
+        return Error{
+            "the labels fit no human body: " + *odd, path,
+            "if they are right, give --anatomy accept, or anatomy = \"accept\" in [import]"};
     return imported;
 }
 
