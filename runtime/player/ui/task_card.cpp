@@ -15,7 +15,6 @@ namespace sonocase::runtime::inline player_ui {
 namespace {
 
 constexpr float kRow = 28;
-constexpr float kLeftFree = 3 * kRow + 52;  // for the values and the head of the hints
 
 const char* const kSteps[] = {"Find the target", "Bring the needle into the plane",
                               "Advance with the tip in view", "Stop in the middle"};
@@ -36,10 +35,60 @@ int present_step(const TaskCardInput& input) {
     return !done.target_seen ? 0 : !done.needle_seen ? 1 : !done.tip_near ? 2 : 3;
 }
 
+// Where the nearest target lies beside the picture, and which way leads there.
+std::string where_target(const TaskCardInput& input) {
+    const Point3* nearest = nullptr;
+    Point3 at{0, 1e9, 0};
+    const Rigid probe_from = inverse(input.record.tools.mannequin_from_probe);
+    for (const Point3& centre : input.target_centres) {
+        const Point3 p = probe_from * centre;
+        if (std::abs(p.y) < std::abs(at.y)) {
+            at = p;
+            nearest = &centre;
+        }
+    }
+    if (!nearest || !input.record.tools.has_probe) return tr("The target is shown.");
+    const double beside = distance_to_image(input.exercise.probe, at.x, at.z);
+    if (std::abs(at.y) <= 3 && beside == 0) return tr("The target is in the picture, in the ring.");
+    const bool off_plane = std::abs(at.y) >= beside;
+    const double by_mm = off_plane ? std::abs(at.y) : beside;
+    if (!input.mouse)
+        return text(tr(off_plane ? "The target lies %.0f mm beside the plane."
+                                 : "The target lies %.0f mm beside the picture."),
+                    by_mm);
+    const bool right = (at.x > 0) != input.flipped;
+    const char* words =
+        off_plane ? (at.y > 0 ? "The target lies %.0f mm beside the plane: arrow up leads there."
+                              : "The target lies %.0f mm beside the plane: arrow down leads there.")
+        : at.z > 0 && std::abs(at.x) < 1 ? "The target lies %.0f mm beside the picture."
+        : right ? "The target lies %.0f mm beside the picture: arrow right leads there."
+                : "The target lies %.0f mm beside the picture: arrow left leads there.";
+    return text(tr(words), by_mm);
+}
+
+// The last hint asked for; empty: none was.
+std::string hint_words(const TaskCardInput& input) {
+    const int count = static_cast<int>(input.exercise.hints.size());
+    if (input.hints_shown == 0) return "";
+    return input.hints_shown > count ? where_target(input)
+                                     : input.exercise.hints[input.hints_shown - 1];
+}
+
+float hint_height(const Ui& ui, float width, const std::string& words) {
+    return 44 + (words.empty() ? 0 : ui.paragraph_height(width - 20, words, Type::small) + 10);
+}
+
+// What the values and the hints of the card take below what stands above them.
+float kept_free(const Ui& ui, float width, const TaskCardInput& input) {
+    if (!input.attempt) return 3 * kRow;
+    const float rows = input.exam ? 1 : input.shows_targets ? 3 : 2;
+    return 10 + rows * kRow + (input.exam ? 40 : hint_height(ui, width, hint_words(input)));
+}
+
 // Small words where they fit whole.
-void draw_small(Ui& ui, Box& room, const std::string& words) {
+void draw_small(Ui& ui, Box& room, const std::string& words, float free) {
     const float high = ui.paragraph_height(room.w, words, Type::small);
-    if (high + kLeftFree > room.h) return;
+    if (high + 8 + free > room.h) return;
     ui.paragraph(room.take_top(high, 8), words, Type::small, colour::kDim);
 }
 
@@ -60,7 +109,8 @@ void draw_steps(Ui& ui, Box& room, const TaskCardInput& input) {
     const char* words = now < 4 ? kSteps[now] : "All targets reached";
     const float high = std::min(ui.paragraph_height(room.w, tr(words), Type::bold), 36.0f);
     ui.paragraph(room.take_top(high, 4), tr(words), Type::bold, colour::kText, true);
-    if (input.mouse && now < 4) draw_small(ui, room, tr(kStepKeys[now]));
+    if (input.mouse && now < 4)
+        draw_small(ui, room, tr(kStepKeys[now]), kept_free(ui, room.w, input));
 }
 
 void draw_values(Ui& ui, Box& room, const TaskCardInput& input) {
@@ -109,48 +159,12 @@ void draw_values(Ui& ui, Box& room, const TaskCardInput& input) {
             ui.paragraph(room, tr_message(view.problem), Type::small, colour::kBad, true));
 }
 
-// Where the nearest target lies beside the picture, and which way leads there.
-std::string where_target(const TaskCardInput& input) {
-    const Point3* nearest = nullptr;
-    Point3 at{0, 1e9, 0};
-    const Rigid probe_from = inverse(input.record.tools.mannequin_from_probe);
-    for (const Point3& centre : input.target_centres) {
-        const Point3 p = probe_from * centre;
-        if (std::abs(p.y) < std::abs(at.y)) {
-            at = p;
-            nearest = &centre;
-        }
-    }
-    if (!nearest || !input.record.tools.has_probe) return tr("The target is shown.");
-    const double beside = distance_to_image(input.exercise.probe, at.x, at.z);
-    if (std::abs(at.y) <= 3 && beside == 0) return tr("The target is in the picture, in the ring.");
-    const bool off_plane = std::abs(at.y) >= beside;
-    const double by_mm = off_plane ? std::abs(at.y) : beside;
-    if (!input.mouse)
-        return text(tr(off_plane ? "The target lies %.0f mm beside the plane."
-                                 : "The target lies %.0f mm beside the picture."),
-                    by_mm);
-    const bool right = (at.x > 0) != input.flipped;
-    const char* words =
-        off_plane ? (at.y > 0 ? "The target lies %.0f mm beside the plane: arrow up leads there."
-                              : "The target lies %.0f mm beside the plane: arrow down leads there.")
-        : at.z > 0 && std::abs(at.x) < 1 ? "The target lies %.0f mm beside the picture."
-        : right ? "The target lies %.0f mm beside the picture: arrow right leads there."
-                : "The target lies %.0f mm beside the picture: arrow left leads there.";
-    return text(tr(words), by_mm);
-}
-
 // Hints asked for so far, the last one in full; where that does not fit, one line and a button.
 void draw_hints(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
     const int count = static_cast<int>(input.exercise.hints.size());
     if (room.h < 44) return;
-    const int shown = std::min(input.hints_shown, count);
-    const std::string words = shown == 0                  ? ""
-                              : input.hints_shown > count ? where_target(input)
-                                                          : input.exercise.hints[shown - 1];
-    const float text_height =
-        words.empty() ? 0 : ui.paragraph_height(room.w - 20, words, Type::small) + 10;
-    const float high = std::min(44 + text_height, room.h);
+    const std::string words = hint_words(input);
+    const float high = std::min(hint_height(ui, room.w, words), room.h);
     Box card = room.take_top(high, 8);
     ui.card(card, "hint", colour::kRaised);
     Box head = card.take_top(44);
@@ -288,14 +302,16 @@ TaskCardRequest draw_task_card(Ui& ui, const Box& card, const TaskCardInput& inp
         return request;
     }
     if (input.attempt && !input.exam && room.h > 150) draw_steps(ui, room, input);
-    if (input.attempt && input.exam && input.mouse) draw_small(ui, room, tr(kAllKeys));
+    if (input.attempt && input.exam && input.mouse)
+        draw_small(ui, room, tr(kAllKeys), kept_free(ui, room.w, input));
     if (!input.exercise.description.empty()) {
-        const float room_left = std::max(room.h - (input.attempt ? kLeftFree : 3 * kRow), 0.0f);
-        const float high = std::min(
-            ui.paragraph_height(room.w, input.exercise.description, Type::small), room_left);
-        if (high >= 17)
-            ui.paragraph(room.take_top(high, 8), input.exercise.description, Type::small,
-                         colour::kDim, true);
+        const std::string& words = input.exercise.description;
+        const float whole = ui.paragraph_height(room.w, words, Type::small);
+        const float high =
+            std::min(whole, std::max(room.h - 8 - kept_free(ui, room.w, input), 0.0f));
+        // In an attempt one line of several says nothing.
+        if (high >= (input.attempt ? std::min(whole, 34.0f) : 17.0f))
+            ui.paragraph(room.take_top(high, 8), words, Type::small, colour::kDim, true);
     }
     if (room.h > 8) {
         ui.line(room.x, room.y, room.right(), room.y, colour::kLine);

@@ -27,7 +27,7 @@ void fill_columns(ScanLayout& layout, Box area, bool shows_3d) {
     layout.cine = area.take_bottom(kCine);
     layout.picture = area;
     if (shows_3d) {
-        const float view = std::max(kMinView, std::floor((wide ? 0.5f : 0.385f) * left.h));
+        const float view = std::max(kMinView, std::floor((wide ? 0.5f : 0.3f) * left.h));
         layout.view3d = left.take_bottom(view, kGap);
     }
     layout.task = left;
