@@ -227,8 +227,8 @@ TEST(SpeckleMotion, AtEveryDepthOfEveryProbeItMovesAlongTheFace) {
             const Plane still = sweep.detail({});
             std::printf("%s, %3.0f mm:", probe.name, depth);
             for (const auto& limit : limits) {
-                const double c = sweep.correlation(still, sweep.detail(moved({}, {limit.mm, 0, 0})),
-                                                   depth - 12, depth + 12);
+                const Plane now = sweep.detail(moved({}, {limit.mm, 0, 0}));
+                const double c = sweep.correlation(still, now, depth - 12, depth + 12, limit.mm);
                 std::printf(" %.2f", c);
                 EXPECT_GE(c, limit.least) << probe.name << ", " << depth << " mm";
             }

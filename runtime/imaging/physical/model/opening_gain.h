@@ -21,7 +21,7 @@
 
 namespace sonocase::runtime::physical {
 
-inline constexpr double kOpeningGrey = 95;  // of organs, mean
+inline constexpr double kOpeningGrey = 98;  // of organs, mean
 inline constexpr double kEvened = 0.7;      // share of the difference between depths
 
 // dB at eight depths, from the face to the picture's lower edge, linear in between.

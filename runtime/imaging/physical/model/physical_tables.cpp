@@ -19,7 +19,7 @@ constexpr double kCellPerStep = 1.25;  // the edge is at least this many samples
 // Beams stand no farther apart than this many edges: what lies between two beams would show in
 // neither, and speckle would not follow the tissue. Where beams are fewer, the edge grows instead,
 // and the point spread with it.
-constexpr double kMaxPitch = 1.5;
+constexpr double kMaxPitch = 1.42;
 constexpr double kCoarsest = 3;  // limit of that growth
 constexpr int kSkirtReach = 6;   // beams; what lies further out does not show
 

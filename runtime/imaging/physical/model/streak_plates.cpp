@@ -464,7 +464,7 @@ const PlateKind& plate_kind(double frequency_mhz) {
                                       .tries = 18,
                                       .face_sin = 0.45,
                                       .first_mm = 1.5,
-                                      .amplitude = 3,
+                                      .amplitude = 2.6,
                                       .levels = {0.2, 0.41, 0.59, 0.83, 1.19, 1.67, 2.45, 5},
                                       .length_scale = 1.3,
                                       .max_bend = 0.04,
