@@ -52,8 +52,8 @@ struct SensorWatchOptions {
     // A sensor whose noise changed noisy_readings readings on end, each within noisy_step_s of the
     // one before, is lost once its pose repeats to the last bit for repeated_after_s, while others
     // change repeated_readings times: its sender goes on with the last pose.
-    int noisy_readings = 6, repeated_readings = 5;
-    double noisy_step_s = 0.1, repeated_after_s = 0.2;
+    int noisy_readings = 4, repeated_readings = 5;
+    double noisy_step_s = 0.25, repeated_after_s = 0.2;
 };
 
 enum class SensorVerdict : std::uint8_t { fine, absent, lost, stale, frozen, jumped, poor };
