@@ -150,7 +150,8 @@ std::function<std::vector<StageReport>(const StageValue& value)> reports_of(cons
 }
 
 // The reports with their seconds set to zero: what a stage's bytes hold of them.
-// Nor do they hold the word that anatomy agrees; what does not agree stays.
+// Nor do they hold the word that anatomy agrees, or that a GLB lies as its format has it; what does
+// not agree stays.
 std::vector<StageReport> without_seconds(std::vector<StageReport> reports);
 
 // What the stages of a case are sized by.

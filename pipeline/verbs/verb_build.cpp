@@ -237,7 +237,10 @@ int build_one(const BuildOptions& options) {
                                             watch.seconds(), expected, *choice, achieved_error_mm);
     if (auto status = write_case(options, out, *cooked, bytes, report); !status)
         return fail("build", status.error());
-    for (const StageRun& run : cooked->stages) print_warnings("build", with_cache_notes(run));
+    for (const StageRun& run : cooked->stages) {
+        print_notes("build", run.report);
+        print_warnings("build", with_cache_notes(run));
+    }
     const Grid& grid = cooked->bundle.grid;
     std::printf("%s  %.1f MB, %d x %d x %d voxels of %g mm, %zu labels, %.1f s\n", out.c_str(),
                 static_cast<double>(bytes.size()) / 1e6, grid.size.x, grid.size.y, grid.size.z,

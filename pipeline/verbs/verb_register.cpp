@@ -263,7 +263,6 @@ void add_input_reports(const RegisterInputs& inputs, StageReport& report) {
     report.measures.insert(report.measures.end(), inputs.skin.report.measures.begin(),
                            inputs.skin.report.measures.end());
     report.measures.insert(report.measures.end(), inputs.reduction.begin(), inputs.reduction.end());
-    report.notes.insert(report.notes.end(), inputs.notes.begin(), inputs.notes.end());
     report.measures.push_back({"import_seconds", inputs.import_seconds});
     report.measures.push_back({"surface_seconds", inputs.skin.report.seconds});
     report.seconds += inputs.skin.report.seconds;

@@ -243,7 +243,7 @@ Result<MeshBody> read_meshes(const std::string& path,
     SONOCASE_TRY(const std::string axes, collector.axes(path));
     if (!axes.empty())
         report.notes.push_back({"axes", axes});
-    else if (options.axes != Axes::unsaid)
+    else
         report.notes.push_back({"axes", gltf_axes_sentence(options.axes)});
     if (!collector.aside().empty())
         report.warnings.push_back(

@@ -61,6 +61,8 @@ TEST_F(MeshFolder, MakesSolidsInRasWithNamesAndAttribution) {
     ASSERT_TRUE(body) << body.error().message();
     ASSERT_EQ(body->solids.size(), 1u);
     EXPECT_EQ(body->attribution, "By somebody.");
+    ASSERT_FALSE(body->report.notes.empty());
+    EXPECT_NE(body->report.notes[0].text.find("y to the head"), std::string::npos);
     const double ml = static_cast<double>(body->solids[0].mask.count()) * 0.008;
     EXPECT_NEAR(ml / (4.0 / 3 * 3.14159 * 15.625), 1, 0.005);
     // x to the left, y to the head, z to the front become (-30, 20, 10).
