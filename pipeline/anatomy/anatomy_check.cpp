@@ -834,7 +834,7 @@ class Check {
                                              "' although its place lies in the map");
             }
         }
-        const double tall = body_.field.empty() ? 1000 : body_.field.extent().z;
+        const double tall = body_.field.empty() ? 1000 : body_.field.extent().z + body_.voxel_mm.z;
         if (tall < 80)
             report.remarks.push_back(
                 text("the map is %.0f mm tall: places along the body say little", tall));

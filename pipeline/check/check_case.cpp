@@ -221,12 +221,14 @@ class Anatomy {
             for (int j = 0; j < bundle_.grid.size.y; ++j)
                 for (int i = 0; i < bundle_.grid.size.x; ++i)
                     volume.voxels.push_back(bundle_.label_bricks.at(i, j, k));
-        // The map bends the body, and where the label map ended is no longer known.
+        // The map bends the body, and a part that the label map's face cut off an organ can no longer
+        // be told from another organ: names are import's to check.
         AnatomyOptions options;
         options.margin = 10;
         const AnatomyReport report = check_anatomy(summarise_body(volume, ct_from_grid), options);
         for (const AnatomyFinding& f : report.findings)
-            result_.remarks.push_back("anatomy: " + f.text);
+            if (f.cause != AnatomyCause::names_exchanged && f.cause != AnatomyCause::two_in_one)
+                result_.remarks.push_back("anatomy: " + f.text);
     }
 
     bool is_lesion(const std::string& name) const {

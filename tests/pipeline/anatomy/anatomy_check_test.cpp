@@ -15,12 +15,16 @@
 #include <string>
 #include <vector>
 
+#include "formats/files/load_save.h"
 #include "pipeline/anatomy/analytic_torso.h"
 #include "pipeline/anatomy/anatomy_check.h"
 #include "pipeline/import/body/mesh_labels.h"
 #include "pipeline/import/volume/label_map.h"
+#include "pipeline/stages/import_stage.h"
+#include "pipeline/stages/stage_table.h"
 #include "support/paths.h"
 #include "support/random.h"
+#include "support/temporary_folder.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -389,7 +393,7 @@ TEST(AnatomyCheck, OddBodiesAreAccepted) {
     const LabelVolume slab =
         cropped(whole_body, {0, 0, size.z / 2}, {size.x - 1, size.y - 1, size.z / 2 + 6});
     EXPECT_TRUE(check_anatomy(summarise_body(slab)).findings.empty());
-    EXPECT_NE(verdict_of(summarise_body(slab)).find("36 mm tall"), std::string::npos);
+    EXPECT_NE(verdict_of(summarise_body(slab)).find("42 mm tall"), std::string::npos);
 
     // A uterus of 6 l, and all organs of a child half as tall.
     BodySummary pregnant = torso();
@@ -445,6 +449,39 @@ TEST(AnatomyCheck, OnlyWhatFitsNoBodyIsAnError) {
     parts.labels.pop_back();
     parts.labels[0].ml = 4000;
     EXPECT_FALSE(check_anatomy(parts).findings.at(0).error);
+}
+
+TEST(AnatomyCheck, ImportReportsRefusesAndAccepts) {
+    const sonocase::testing::TemporaryFolder folder;
+    Recipe recipe;
+    recipe.inputs.labels = folder / "torso.labels";
+    LabelVolume body = bodies().front().labels;
+    const auto imported_with = [&](const std::string& anatomy) {
+        EXPECT_TRUE(save_label_file({"ct", body, {}, {}, {}}, recipe.inputs.labels));
+        MeshImportOptions options;
+        options.anatomy = anatomy;
+        return import_inputs(recipe, options, {});
+    };
+    const auto right = imported_with("check");
+    ASSERT_TRUE(right) << right.error().message();
+    EXPECT_TRUE(right->report.warnings.empty());
+    ASSERT_EQ(right->report.notes.size(), 1u);
+    EXPECT_EQ(right->report.notes[0].name, "anatomy");
+    EXPECT_EQ(right->report.notes[0].text, "agrees: 38 named organs");
+    EXPECT_TRUE(without_seconds({right->report})[0].notes.empty());  // no bundle's bytes change
+
+    // Fat and skin under the names of organs, of several litres each.
+    for (Label& label : body.labels) {
+        if (label.name == "visceral_fat") label.name = "thymus";
+        if (label.name == "other_fat") label.name = "thyroid_gland";
+    }
+    const auto refused = imported_with("check");
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().message().find("--anatomy accept"), std::string::npos);
+    const auto accepted = imported_with("accept");
+    ASSERT_TRUE(accepted) << accepted.error().message();
+    ASSERT_FALSE(accepted->report.warnings.empty());
+    EXPECT_TRUE(accepted->report.warnings[0].starts_with("anatomy: "));
 }
 
 TEST(AnatomyCheck, ANameIsKnownInSeveralForms) {
