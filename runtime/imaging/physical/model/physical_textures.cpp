@@ -114,7 +114,7 @@ std::vector<std::int8_t> make_cubes() {
     RawVector<float> db(cube);
     // Fibres: sparse bright strands on dark ground.
     for (std::size_t i = 0; i < cube; ++i)
-        db[i] = -5 + 13 * std::clamp(a[i] + 0.3f * c[i] - 0.35f, 0.0f, 1.9f);
+        db[i] = -4 + 10 * std::clamp(a[i] + 0.3f * c[i] - 0.55f, 0.0f, 1.9f);
     store(db, cubes.data());
     // Septa: thin sheets where a smooth field crosses zero, torn here and there. Those that show
     // as lines are sheets of the wall (wall_sheets.h); these are faint.

@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// A picture opens bright and shows what is looked for: grey of the sector at gain 0 where an
+// exercise begins, and contrast of each target to its surroundings in the plane of the exercise's
+// own script, with every machine.
+//
+// To measure instead of judge: SONOCASE_LEVELS="A.sonocase B.sonocase" names bundles and prints the
+// figures alone; SONOCASE_LEVELS_OUT names a folder for the pictures.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <sstream>
+
+#include "formats/files/load_save.h"
+#include "formats/machine/machine.h"
+#include "formats/scoring/anatomy.h"
+#include "formats/volume/tissue.h"
+#include "runtime/engine/skin.h"
+#include "runtime/imaging/renderer.h"
+#include "runtime/tracking/mouse_tracker.h"
+#include "runtime/tracking/scripted_sweep.h"
+#include "support/paths.h"
+#include "support/picture.h"
+#include "support/run_command.h"
+
+namespace sonocase {
+namespace {
+
+namespace fs = std::filesystem;
+using runtime::Renderer;
+
+constexpr int kSize = 512;
+constexpr int kBeams = 128, kPenumbra = 2;  // of kBeams
+
+struct Moments {
+    double sum = 0, square = 0, n = 0;
+    void add(double v) {
+        sum += v;
+        square += v * v;
+        n += 1;
+    }
+    double mean() const { return sum / n; }
+    double variance() const { return std::max(square / n - mean() * mean(), 0.0); }
+};
+
+// One renderer of an exercise, with what its pictures are judged by.
+class Picture {
+  public:
+    Picture(const CaseBundle& bundle, const Exercise& exercise, const std::string& machine)
+        : bundle_(bundle),
+          exercise_(exercise),
+          skin_(bundle),
+          anatomy_(bundle),
+          tissue_of_(tissue_of_label(bundle)) {
+        runtime::RenderOptions options;
+        options.width_px = options.height_px = kSize;
+        if (machine == "paper") {
+            options.model = runtime::ImageModel::paper;
+        } else if (!machine.empty()) {
+            options.machine = *built_in_machine(machine);
+        }
+        auto renderer = Renderer::create(bundle, exercise, options);
+        EXPECT_TRUE(renderer) << renderer.error().message();
+        renderer_ = std::make_unique<Renderer>(std::move(*renderer));
+        pixels_.resize(kSize * kSize);
+    }
+
+    Rigid start() const { return runtime::MouseTracker(skin_, exercise_).mannequin_from_probe(); }
+    // Where the script holds the needle in the target.
+    Rigid scripted() const {
+        for (const Sweep& sweep : exercise_.sweeps) {
+            if (sweep.name != "needle") continue;
+            double best = 1e9, at = 0;
+            for (double t = 0; t <= sweep.keys.back().time_s; t += 0.1) {
+                const auto pose = runtime::sweep_pose(sweep, t, &skin_);
+                if (!pose.has_needle) continue;
+                const double away = distance(Point3{} + pose.mannequin_from_needle.translation,
+                                             exercise_.targets[0].centre);
+                if (away < best) {
+                    best = away;
+                    at = t;
+                }
+            }
+            return runtime::sweep_pose(sweep, at, &skin_).mannequin_from_probe;
+        }
+        return start();
+    }
+    void draw(const Rigid& pose) {
+        runtime::FrameInput input;
+        input.mannequin_from_probe = pose;
+        renderer_->render(input, pixels_);
+        pose_ = renderer_->shown_pose();
+        find_shadows();
+    }
+    void save(const std::string& path) const { testing::write_pgm(path, pixels_, kSize, kSize); }
+
+    // Mean of what has an echo in the middle third of the picture, as the console's Auto takes it.
+    Moments middle() const {
+        Moments out;
+        const auto layout = renderer_->layout();
+        for (int y = 0; y < kSize; ++y) {
+            const double depth = (y - layout.origin_y_px) * layout.mm_per_px;
+            if (depth < 0 || depth > exercise_.probe.depth_mm) continue;
+            for (int x = kSize / 3; x < 2 * kSize / 3; ++x)
+                if (pixel(x, y) >= 30) out.add(pixel(x, y));
+        }
+        return out;
+    }
+    double auto_db() const { return std::round((95 - middle().mean()) * 60 / 255); }
+
+    struct Contrast {
+        Moments target, around;
+        double shadowed = 0;  // share of the target that no sound reaches
+        double to_noise() const {
+            return std::abs(target.mean() - around.mean()) /
+                   std::sqrt(0.5 * (target.variance() + around.variance()));
+        }
+    };
+    Contrast contrast(const Target& target) const {
+        Contrast out;
+        const int inside = label_index(target.inside);
+        const bool structure = target.look == TargetLook::none;
+        const double outer = outer_radius_mm(target);
+        double lit = 0, dark = 0;
+        const auto layout = renderer_->layout();
+        for (int y = 0; y < kSize; ++y) {
+            for (int x = 0; x < kSize; ++x) {
+                const Point3 in_plane{(x + 0.5 - layout.origin_x_px) * layout.mm_per_px, 0,
+                                      (y + 0.5 - layout.origin_y_px) * layout.mm_per_px};
+                if (!in_sector(in_plane)) continue;
+                const Point3 now = pose_ * in_plane;
+                if (distance(now, target.centre) > 2 * outer + 12) continue;  // pressed a little
+                const Point3 rest = renderer_->at_rest(now);
+                const int label = anatomy_.label(rest);
+                const double away = distance(rest, target.centre);
+                const bool in = structure ? away < 2 * target.radius_mm + 4 && label == inside &&
+                                                fills(in_plane, inside)
+                                          : away < 0.8 * target.radius_mm;
+                const bool by =
+                    structure ? label != inside && soft(label) && away < 2 * target.radius_mm + 8
+                              : away > outer + 2.5 && away < 2 * outer + 4 &&
+                                    (inside >= 0 ? label == inside : soft(label));
+                if (!in && !by) continue;
+                const bool shadow = in_shadow(in_plane);
+                if (in) (shadow ? dark : lit) += 1;
+                if (shadow) continue;
+                (in ? out.target : out.around).add(pixel(x, y));
+            }
+        }
+        out.shadowed = dark / std::max(lit + dark, 1.0);
+        return out;
+    }
+
+  private:
+    double pixel(int x, int y) const { return pixels_[static_cast<std::size_t>(y * kSize + x)]; }
+    int label_index(const std::string& name) const {
+        for (std::size_t l = 0; l < bundle_.labels.size(); ++l)
+            if (bundle_.labels[l].name == name) return static_cast<int>(l);
+        return -1;
+    }
+    // A label, and nothing else within a millimetre: a wall's echo is as wide.
+    bool fills(Point3 in_plane, int label) const {
+        for (const Vector3 by : {Vector3{}, Vector3{1.2, 0, 0}, Vector3{-1.2, 0, 0},
+                                 Vector3{0, 0, 1.2}, Vector3{0, 0, -1.2}}) {
+            if (anatomy_.label(renderer_->at_rest(pose_ * (in_plane + by))) != label) return false;
+        }
+        return true;
+    }
+    bool soft(int label) const {
+        return label > 0 && tissue_of_[static_cast<std::size_t>(label)] >= 0 &&
+               bundle_.tissues[static_cast<std::size_t>(
+                                   tissue_of_[static_cast<std::size_t>(label)])]
+                       .kind == TissueKind::soft;
+    }
+    Point3 apex() const {
+        const Probe& p = exercise_.probe;
+        return {0, 0, p.shape == ProbeShape::curvilinear ? -p.radius_mm : 0};
+    }
+    bool in_sector(Point3 p) const {
+        const Probe& probe = exercise_.probe;
+        if (probe.shape == ProbeShape::linear)
+            return std::abs(p.x) < 0.48 * probe.width_mm && p.z > 1 && p.z < probe.depth_mm;
+        const Vector3 d = p - apex();
+        const double r = norm(d) + apex().z;
+        return r > 1 && r < probe.depth_mm &&
+               std::abs(std::atan2(d.x, d.z)) < 0.47 * probe.field_of_view_rad;
+    }
+    // Place of a point on the face, [0, 1], and its depth.
+    std::pair<double, double> on_face(Point3 p) const {
+        const Probe& probe = exercise_.probe;
+        if (probe.shape == ProbeShape::linear) return {p.x / probe.width_mm + 0.5, p.z};
+        const Vector3 d = p - apex();
+        return {std::atan2(d.x, d.z) / probe.field_of_view_rad + 0.5, norm(d) + apex().z};
+    }
+    // Depth of the first bone or gas under each of kBeams parts of the face.
+    void find_shadows() {
+        const Probe& probe = exercise_.probe;
+        for (int b = 0; b < kBeams; ++b) {
+            const double share = (b + 0.5) / kBeams - 0.5;
+            const bool linear = probe.shape == ProbeShape::linear;
+            const double angle = linear ? 0 : share * probe.field_of_view_rad;
+            const Vector3 d{std::sin(angle), 0, std::cos(angle)};
+            const Point3 face =
+                linear ? Point3{share * probe.width_mm, 0, 0} : apex() + -apex().z * d;
+            double r = 0;
+            while (r < probe.depth_mm && !anatomy_.blocks_sound(anatomy_.label(
+                                             renderer_->at_rest(pose_ * (face + r * d)))))
+                r += 1;
+            blocked_[static_cast<std::size_t>(b)] = r;
+        }
+    }
+    // Bone or gas on the way of the sound, or beside it: shadows have soft edges.
+    bool in_shadow(Point3 p) const {
+        const auto [share, depth] = on_face(p);
+        const int at = static_cast<int>(share * kBeams);
+        for (int b = std::max(at - kPenumbra, 0); b <= std::min(at + kPenumbra, kBeams - 1); ++b)
+            if (blocked_[static_cast<std::size_t>(b)] < depth) return true;
+        return false;
+    }
+
+    const CaseBundle& bundle_;
+    Exercise exercise_;
+    runtime::Skin skin_;
+    CaseAnatomy anatomy_;
+    std::vector<int> tissue_of_;
+    std::unique_ptr<Renderer> renderer_;
+    std::vector<std::uint8_t> pixels_;
+    Rigid pose_;
+    std::array<double, kBeams> blocked_{};
+};
+
+// What Auto may ask for where an exercise begins. The opening gain knows the script's place and
+// labels; the start may hold a soft-edged shadow besides.
+constexpr double kMostAutoDb = 5;
+
+double least_contrast(const Exercise& exercise) {
+    if (exercise.difficulty > 3) return 1;
+    // A vein lies among septa as bright as its walls.
+    return exercise.targets[0].look == TargetLook::none ? 1.4 : 1.5;
+}
+
+void measure(const std::string& path, bool judge) {
+    auto loaded = load_bundle(path);
+    ASSERT_TRUE(loaded) << loaded.error().message();
+    const CaseBundle& bundle = *loaded;
+    const char* out = std::getenv("SONOCASE_LEVELS_OUT");
+    std::printf("%-14s %-24s %-14s %7s %5s  %6s %6s %6s %6s\n", bundle.manifest.case_name.c_str(),
+                "exercise", "machine", "middle", "Auto", "target", "around", "CNR", "shadow");
+    for (const EmbeddedExercise& embedded : bundle.exercises) {
+        auto exercise = parse_exercise(embedded.toml, embedded.name);
+        ASSERT_TRUE(exercise) << exercise.error().message();
+        const bool linear = exercise->probe.shape == ProbeShape::linear;
+        const std::string own = linear ? "modern-linear" : "modern";
+        // Model paper draws no lesion of an exercise, and `modern` is a fan.
+        for (const std::string machine : {"modern", "modern-linear", "classic", "paper"}) {
+            const bool of_probe = machine != "paper" && !(machine == "modern" && linear);
+            Picture picture(bundle, *exercise, machine);
+            picture.draw(picture.start());
+            const double middle = picture.middle().mean(), auto_db = picture.auto_db();
+            const std::string name =
+                bundle.manifest.case_name + "-" + exercise->name + "-" + machine;
+            if (out != nullptr) picture.save(std::string(out) + "/" + name + "-start.pgm");
+            picture.draw(picture.scripted());
+            if (out != nullptr) picture.save(std::string(out) + "/" + name + "-target.pgm");
+            std::printf("%-14s %-24s %-14s %7.1f %5.0f", "", exercise->name.c_str(),
+                        machine.c_str(), middle, auto_db);
+            if (!exercise->targets.empty()) {
+                const auto contrast = picture.contrast(exercise->targets[0]);
+                std::printf("  %6.1f %6.1f %6.2f %6.2f", contrast.target.mean(),
+                            contrast.around.mean(), contrast.to_noise(), contrast.shadowed);
+                if (judge && of_probe && contrast.shadowed < 0.5) {
+                    EXPECT_GE(contrast.to_noise(), least_contrast(*exercise)) << name;
+                }
+            }
+            std::printf("\n");
+            if (judge && machine == own) {
+                EXPECT_LE(std::abs(auto_db), kMostAutoDb) << name;
+            }
+        }
+    }
+}
+
+std::string cooked(const testing::TemporaryFolder& folder, const std::string& arguments) {
+    const std::string path = folder / "case.sonocase";
+    const auto build = testing::run_command(std::string(SONOCASE_BIN) + "/sonocase build " +
+                                            arguments + " --quiet -o " + path);
+    EXPECT_EQ(build.status, 0) << build.error;
+    return path;
+}
+
+TEST(PictureLevels, AsMeasuredInNamedBundles) {
+    const char* named = std::getenv("SONOCASE_LEVELS");
+    if (named == nullptr) GTEST_SKIP() << "SONOCASE_LEVELS names no bundle";
+    std::istringstream paths(named);
+    for (std::string path; paths >> path;) measure(path, false);
+}
+
+TEST(PictureLevels, OfTheDemoTorso) {
+    const testing::TemporaryFolder folder;
+    measure(cooked(folder, "--preset draft"), true);
+}
+
+TEST(PictureLevels, OfTheRealTorso) {
+    const std::string data = SONOCASE_DATA;
+    if (!fs::exists(data + "/ct/labels.nii.gz")) GTEST_SKIP() << "no " << data;
+    const testing::TemporaryFolder folder;
+    measure(
+        cooked(folder, std::string(SONOCASE_SOURCE) + "/scenarios/real-torso/case.toml --data " +
+                           data + " --set resample.voxel_mm=2"),
+        true);
+}
+
+}  // namespace
+}  // namespace sonocase
