@@ -285,7 +285,8 @@ class HeadlessRun {
     std::vector<std::uint8_t> pixels_;
     ImageSettings settings_;
     TrackerReading reading_;
-    std::string said_;  // format of the tracker's last sentence
+    std::string said_;          // format of the tracker's last sentence
+    bool heard_cause_ = false;  // it was printed: more than that the tracker begins
     struct LostFrames {
         int frames = 0, seen = 0;  // lost since it was seen first; seen
         double seconds = 0;
@@ -395,8 +396,12 @@ Status HeadlessRun::wait_for_reading() {
     while (!tracker_->poll(clock_(), reading_)) {
         if (clock_() >= give_up_s || tracker_->health().phase == TrackerPhase::failed) {
             const TrackerHealth health = tracker_->health();
-            return Error{health.message.empty() ? "no reading came" : health.message,
-                         "tracker " + spec_, "check the device, or use --tracker mouse"};
+            // A sentence that was said as a warning names the cure itself.
+            const bool explained = !health.message.empty() && health.message.format() == said_ &&
+                                   health.phase != TrackerPhase::failed;
+            return Error{
+                health.message.empty() ? "no reading came" : health.message, "tracker " + spec_,
+                explained && heard_cause_ ? "" : "check the device, or use --tracker mouse"};
         }
         say_health();
         reading_arrived_.wait(0.05);
@@ -413,6 +418,7 @@ void HeadlessRun::say_health() {
         return;
     const bool first = said_.empty() && health.phase == TrackerPhase::starting;
     said_ = health.message.format();
+    heard_cause_ = !first;
     if (!first) warn(health.message);
 }
 
