@@ -247,7 +247,7 @@ struct Quadratic {
 };
 
 // Decreasing weights, down to what the gaps justify or the option says. The start is the rigid pose
-// and the steps are few, on purpose: skins tell little of displacements along them, those stay where
+// and the steps are few, on purpose: skins tell little of displacements along them, which stay as
 // the rigid alignment left them. Run to its end at the first weight, the map of two unlike torsos
 // slides along the body until a fifth of the readings has lost its counterpart, for gaps that are
 // no truer; from the samples of a random consensus it ends in basins 10 mm apart.
