@@ -247,7 +247,7 @@ struct Quadratic {
 };
 
 // Decreasing weights, down to what the gaps justify or the option says. The start is the rigid pose
-// and the steps are few, on purpose: skins tell little of displacements along them, those stay where
+// and the steps are few, on purpose: skins tell little of displacements along them, which stay as
 // the rigid alignment left them. Run to its end at the first weight, the map of two unlike torsos
 // slides along the body until a fifth of the readings has lost its counterpart, for gaps that are
 // no truer; from the samples of a random consensus it ends in basins 10 mm apart.
@@ -313,12 +313,27 @@ double inside_with_landmarks(const FitContext& s,
         .inside_mm;
 }
 
-constexpr std::size_t kPointsOfAnOrgan = 60;
+constexpr std::size_t kPointsOfAnOrgan = 25;
 
-// What the posterior of the quadratic leaves open, label by label.
+// Root mean square of the displacement beyond the quadratic. A body can be read either way, as a
+// quadratic or with the displacement, so that this is left open as well.
+double displaced_mm(const FitContext& s,
+                    const Registration& map,
+                    const std::vector<Point3>& points) {
+    if (map.residual.control_mm.empty() || points.empty()) return 0;
+    double sum = 0;
+    for (Point3 p : points) {
+        const Vector3 d = displacement(map.residual, s.fine.origin + (p - Point3{}));
+        sum += dot(d, d);
+    }
+    return std::sqrt(sum / static_cast<double>(points.size()));
+}
+
+// What the posterior of the quadratic and the displacement leave open, label by label.
 std::vector<OrganUnknown> unknown_of(const FitContext& s,
                                      const RigidQuadratic& q,
-                                     const QuadraticTrust& trust) {
+                                     const QuadraticTrust& trust,
+                                     const Registration& map) {
     std::vector<OrganUnknown> unknown;
     if (!s.labels || trust.draws.empty()) return unknown;
     const Grid& grid = s.labels->grid;
@@ -340,14 +355,19 @@ std::vector<OrganUnknown> unknown_of(const FitContext& s,
     }
     for (std::size_t v = 1; v < points.size(); ++v) {
         if (points[v].empty()) continue;
+        const double displaced = displaced_mm(s, map, points[v]);
         std::vector<double> off;
-        for (const RigidQuadratic& draw : trust.draws) {
+        for (RigidQuadratic draw : trust.draws) {
+            for (int d = 0; d < 3; ++d) {
+                for (int c = 0; c < 10; ++c) draw.k[d][c] -= q.k[d][c];
+            }
             double sum = 0;
             for (Point3 p : points[v]) {
-                const Vector3 d = map_point(draw, p) - map_point(q, p);
+                const Vector3 d = map_point(draw, p) - Point3{};
                 sum += dot(d, d);
             }
-            off.push_back(std::sqrt(sum / static_cast<double>(points[v].size())));
+            off.push_back(
+                std::hypot(std::sqrt(sum / static_cast<double>(points[v].size())), displaced));
         }
         std::sort(off.begin(), off.end());
         unknown.push_back(
@@ -365,7 +385,7 @@ WarpFit fit_warp(const FitContext& s,
     WarpFit w;
     const RigidQuadratic start = RigidQuadratic::from_rigid(rigid);
     w.rigid_fit = measure_fit(s.skin, s.target, in_frames(s, start));
-    RigidQuadratic q = start;
+    RigidQuadratic q = start, judged = start;  // the map, and the one that w.trust is of
     RefineOptions stiff;
     stiff.constraint_mm = kFirstConstraintMm;
     w.rigid_trust =
@@ -383,7 +403,7 @@ WarpFit fit_warp(const FitContext& s,
         w.kept_rigid =
             !(fitted.trust.patches > 0 && fitted.trust.held_out_mm < w.rigid_trust.fitted_mm);
         w.trust = fitted.trust;
-        w.unknown = unknown_of(s, fitted.map, fitted.trust);
+        judged = fitted.map;
         if (s.landmarks.empty()) w.with_landmarks_mm = inside_with_landmarks(s, fitted, options);
         q = w.kept_rigid ? start : fitted.map;
         if (!w.kept_rigid) {
@@ -418,6 +438,8 @@ WarpFit fit_warp(const FitContext& s,
     w.sampled_det = proof.min_sample;
     w.fit = w.residual.used ? measure_fit(s.skin, s.target, w.registration) : w.quadratic_fit;
     choose_warp(s, options, progress, &w);
+    w.unknown = unknown_of(s, judged, w.trust, w.registration);
+    w.displaced_mm = displaced_mm(s, w.registration, s.inside);
     report_progress(progress, 0.95, "measuring");
     if (!(w.min_det > kMinDetJacobian)) {
         w.warnings.push_back(
