@@ -197,7 +197,7 @@ RegisterResult align(const FitContext& s,
                      const Progress& progress) {
     const PoseChoice choice = choose_pose(s, options, progress);
     const Rigid pose =
-        refine_rigid_robust(s.fine, s.target, choice.best.rigid.target_from_skin, s.hints, 6, 4);
+        refine_rigid_robust(s.fine, s.target, choice.best.rigid.target_from_skin, s.hints, 6, 15);
     RegisterResult result;
     result.registration = in_frames(s, RigidQuadratic::from_rigid(pose));
     result.registration.min_det_jacobian = 1;

@@ -3,9 +3,9 @@
 // Registration as a whole: maps the patient's skin onto the mannequin, proves that the map does not
 // fold, and reports how good it is and what the data leave undetermined.
 //
-//   rigid starts -> candidates -> quadratic of each -> the best, its runner-up, its mirror, the head
-//   the other way -> point-to-surface quadratic -> residual warp, or the elastic warp where bodies
-//   differ by more than that can close -> proofs, measures, warnings
+//   rigid starts -> candidates -> quadratic of each -> the best, its runner-up, its mirror, the
+//   head the other way -> point-to-surface quadratic -> residual warp, or the elastic warp where
+//   bodies differ by more than that can close -> proofs, measures, warnings
 //
 // The seed turns the set of starts and draws the samples of the paper's random consensus, nothing
 // else: for 96 starts or more the map is the same within half a millimetre for any seed, save where
@@ -90,8 +90,8 @@ struct RunnerUp {
     std::string described;  // "upside down", "front to back", ...
 };
 
-// How far from its true place a structure may lie on the mannequin, by what the readings leave open:
-// half of the maps that explain them as well carry it less than median_mm from here, and 95 %
+// How far from its true place a structure may lie on the mannequin, by what the readings leave
+// open: half of the maps that explain them as well carry it less than median_mm from here, and 95 %
 // less than p95_mm (root mean square over the structure).
 struct OrganUnknown {
     std::string label;

@@ -418,6 +418,8 @@ ceres::CostFunction* automatic(const Cost& cost) {
 
 }  // namespace
 
+constexpr int kSureRounds = 4;  // rounds of matching that no pose slides away in
+
 Rigid refine_rigid_robust(const SkinModel& skin,
                           const TargetSurface& target,
                           const Rigid& start,
@@ -427,6 +429,8 @@ Rigid refine_rigid_robust(const SkinModel& skin,
     Rigid pose = start;
     const std::vector<std::uint32_t> readings = thin_target(target, 1.2 * target.spacing_mm);
     const std::size_t stride = std::max<std::size_t>(1, skin.points.size() / 1200);
+    std::size_t counterparts = 0;
+    Rigid sure = start;  // the pose while every reading that has a counterpart keeps it
     for (int round = 0; round < rounds; ++round) {
         MatchOptions gates;
         gates.farthest_mm = 60;
@@ -434,7 +438,14 @@ Rigid refine_rigid_robust(const SkinModel& skin,
         const MappedSkin mapped = map_skin(skin, RigidQuadratic::from_rigid(pose));
         const Matches matches = find_matches(skin, mapped.points, mapped.normals, mapped.index,
                                              target, readings, stride, gates);
-        if (matches.from_target.size() + matches.from_skin.size() < 30) return pose;
+        const std::size_t found = matches.from_target.size() + matches.from_skin.size();
+        if (found < 30) return sure;
+        // A pose that loses counterparts from round to round slides off the body.
+        if (round == kSureRounds) counterparts = found;
+        if (round <= kSureRounds) sure = pose;
+        if (round > kSureRounds &&
+            static_cast<double>(found) < 0.98 * static_cast<double>(counterparts))
+            return sure;
         double turn[3] = {0, 0, 0};
         double shift[3] = {pose.translation.x, pose.translation.y, pose.translation.z};
         ceres::Problem problem;

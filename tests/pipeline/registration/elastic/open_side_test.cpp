@@ -146,7 +146,7 @@ bool warns(const RegisterResult& result, const std::string& words) {
                        [&](const std::string& w) { return w.find(words) != std::string::npos; });
 }
 
-// One mannequin of each build without landmarks. (With four of each, 20 of 20 as well.)
+// One mannequin of each build, without landmarks.
 TEST(HeadDirection, IsNamedWhereItsSignIsTurnedAndNotWhereItIsRight) {
     for (const Build build : kBuilds) {
         SCOPED_TRACE(build_name(build));
