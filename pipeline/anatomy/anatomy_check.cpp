@@ -612,8 +612,8 @@ class Check {
         }
     }
 
-    // One name for a structure and its missing partner on the other side: the box holds both places,
-    // as that of one alone never does, and its middle lies between them.
+    // One name for a structure and its missing partner on the other side: the box holds both
+    // places, as that of one alone never does, and its middle lies between them.
     void two_in_one() {
         const std::set<const ModelStructure*> there(names_.begin(), names_.end());
         for (std::size_t i = 0; i < seen_.size(); ++i) {

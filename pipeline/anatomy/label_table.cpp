@@ -324,7 +324,8 @@ Result<LabelTable> parse_label_xml(std::string_view xml, const std::string& wher
 
 Result<LabelTable> segments_of_fields(const std::map<std::string, std::string>& fields,
                                       const std::string& where) {
-    // The numbers of all keys "Segment<N>_...": writers other than Slicer begin at 1, or leave gaps.
+    // The numbers of all keys "Segment<N>_...": writers other than Slicer begin at 1, or leave
+    // gaps.
     std::map<std::string, int> prefixes;  // "Segment12_" and 12
     for (const auto& [key, text] : fields) {
         const std::size_t end = key.find('_');

@@ -205,8 +205,8 @@ class Anatomy {
                  "expected mm: check the unit of the label map and the mannequin (scale)"});
     }
 
-    // Places, names and sizes against the model of a torso, in the axes that organs show. What import
-    // warned of is said by its report.
+    // Places, names and sizes against the model of a torso, in the axes that organs show. What
+    // import warned of is said by its report.
     void places() {
         if (!(norm(result_.up) > 0)) return;
         for (const StageReport& report : bundle_.manifest.stages)
@@ -221,8 +221,8 @@ class Anatomy {
             for (int j = 0; j < bundle_.grid.size.y; ++j)
                 for (int i = 0; i < bundle_.grid.size.x; ++i)
                     volume.voxels.push_back(bundle_.label_bricks.at(i, j, k));
-        // The map bends the body, and a part that the label map's face cut off an organ can no longer
-        // be told from another organ: names are import's to check.
+        // The map bends the body, and a part that the label map's face cut off an organ can no
+        // longer be told from another organ: names are import's to check.
         AnatomyOptions options;
         options.margin = 10;
         const AnatomyReport report = check_anatomy(summarise_body(volume, ct_from_grid), options);

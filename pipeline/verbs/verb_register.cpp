@@ -169,7 +169,7 @@ struct RegisterInputs {
     RegisterOptions options;
     double import_seconds = 0;
     std::vector<Measure> reduction;  // of a dense mannequin, as import_surface reports it
-    std::vector<Note> notes;         // of the import: what axes and units were taken for, the anatomy
+    std::vector<Note> notes;  // of the import: what axes and units were taken for, the anatomy
     std::vector<std::string> warnings;
 };
 // What becomes of a dense scan, without its size.

@@ -24,8 +24,8 @@ class KeyTaps {
         k.modifiers = modifiers;
     }
     // Call this at the start of a picture. down: the keys that are held, at least kKeys of them.
-    // Changes those whose presses have to be shown; release() at the end of the picture undoes that.
-    // Returns the modifiers of the presses that this picture shows.
+    // Changes those whose presses have to be shown; release() at the end of the picture undoes
+    // that. Returns the modifiers of the presses that this picture shows.
     int hold(std::span<bool> down) {
         int modifiers = 0;
         for (std::size_t key = 0; key < kKeys; ++key) {

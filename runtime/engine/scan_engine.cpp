@@ -118,8 +118,8 @@ void ScanEngine::observe(const TrackerReading& given, bool is_device) {
     force_watch_.observe(reading.force_n, reading.time_s);
     reading_ = reading;
     ToolPoses tools = tool_poses(reading, calibrations_, assignment_);
-    // Readings in `mannequin` of no device (scripts, the mouse, sessions recorded here) were checked
-    // where they were made: holding them back a second time would make a replay differ.
+    // Readings in `mannequin` of no device (scripts, the mouse, sessions recorded here) were
+    // checked where they were made: holding them back a second time would make a replay differ.
     const bool checked = reading.in_mannequin && !is_device;
     // A lost probe keeps its last place, so that the picture freezes rather than flickers.
     if (!checked && probe_watch_.hold()) tools.has_probe = tools_.has_probe;

@@ -44,7 +44,8 @@ struct ToolPoses {
     bool has_probe = false, has_needle = false;
     Rigid mannequin_from_probe;
     Rigid mannequin_from_needle;  // origin at the tip, z from hub to tip
-    // How long ago a device measured them; a tool that is lost keeps its last pose and is not `has`.
+    // How long ago a device measured them; a tool that is lost keeps its last pose and is not
+    // `has`.
     double probe_age_s = 0, needle_age_s = 0;
 };
 
