@@ -17,7 +17,7 @@ endif()
 set(SONOCASE_PARTS_KNOWN ON CACHE INTERNAL "SONOCASE_<PART> may be AUTO")
 
 # sonocase_missing(VARIABLE PACKAGE=THING...): those Debian packages whose THING is not found: a header, or bin/PROGRAM,
-# lib/LIBRARY or python:MODULE. Not kept in the cache, so that a package that was installed since is seen.
+# lib/LIBRARY or python:MODULE. What is missing is not kept in the cache, so that a package that was installed since is seen.
 function(sonocase_missing variable)
   set(missing "")
   foreach(pair IN LISTS ARGN)
@@ -30,10 +30,15 @@ function(sonocase_missing variable)
     elseif(thing MATCHES "^lib/(.*)$")
       find_library(found NAMES "${CMAKE_MATCH_1}" "lib${CMAKE_MATCH_1}.so.1" NO_CACHE)
     elseif(thing MATCHES "^python:(.*)$")
-      execute_process(COMMAND ${Python_EXECUTABLE} -c "import ${CMAKE_MATCH_1}" RESULT_VARIABLE failed OUTPUT_QUIET ERROR_QUIET)
-      if(NOT failed)
-        set(found ON)
+      # What was found is kept: pip may configure the folder again from a Python that it has cut off from all modules.
+      set(module "${CMAKE_MATCH_1}")
+      if(NOT SONOCASE_FOUND_PYTHON_${module})
+        execute_process(COMMAND ${Python_EXECUTABLE} -c "import ${module}" RESULT_VARIABLE failed OUTPUT_QUIET ERROR_QUIET)
+        if(NOT failed)
+          set(SONOCASE_FOUND_PYTHON_${module} ON CACHE INTERNAL "Python can import it")
+        endif()
       endif()
+      set(found "${SONOCASE_FOUND_PYTHON_${module}}")
     elseif(thing STREQUAL "Python.h")
       find_package(Python QUIET COMPONENTS Interpreter Development.Module)
       set(found ${Python_FOUND})

@@ -64,17 +64,6 @@ LabelVolume cropped(const LabelVolume& body, Int3 low, Int3 high) {
     return out;
 }
 
-// The table of the woman's meshes gives the hilum of each kidney to the femur of its side.
-LabelVolume without_bone_in_kidneys(LabelVolume body) {
-    std::size_t v = 0;
-    for (int k = 0; k < body.grid.size.z; ++k)
-        for (int n = 0; n < body.grid.size.x * body.grid.size.y; ++n, ++v)
-            if (body.labels[body.voxels[v]].name.starts_with("femur_") &&
-                body.grid.point_from_voxel({0, 0, static_cast<double>(k)}).z > 150)
-                body.voxels[v] = 0;
-    return body;
-}
-
 struct NamedBody {
     std::string name;
     LabelVolume labels;
@@ -100,7 +89,7 @@ const std::vector<NamedBody>& bodies() {
             options.mesh.high_mm = 430;
             const auto woman = import_meshes(data + "/organ_meshes",
                                              scenarios + "/atlas-woman/nodes.csv", options);
-            if (woman) list.push_back({"woman", without_bone_in_kidneys(woman->labels)});
+            if (woman) list.push_back({"woman", woman->labels});
         }
         return list;
     }();

@@ -36,7 +36,7 @@ std::string script(const std::string& folder) {
            shot("attempt") + "key b\nwait 6\n" + shot("scores") + "key p\nwait 6\n" +
            shot("replay") + "key p\nwait 3\nkey escape\nkey f8\nwait 3\n" + shot("exercises") +
            "key f8\nhold e 118\nkey 2 shift\nwait 20\n" + shot("colour") +
-           "key 3 shift\nwait 20\n" + shot("spectrum") + "key 1 shift\nkey f2\nwait 60\n" +
+           "key 3 shift\nwait 300\n" + shot("spectrum") + "key 1 shift\nkey f2\nwait 60\n" +
            shot("cases") + "quit\n";
 }
 
