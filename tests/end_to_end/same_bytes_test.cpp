@@ -30,11 +30,11 @@ using sonocase::testing::run_command;
 constexpr const char* kDraft = "c6ae7c88e65c01d57f8339f129005d9f";
 constexpr const char* kBalanced = "c328d27cc906783b8b19aa1b625a5d21";
 constexpr const char* kSlender = "2fff78b44b130cb62179f98079c87f1d";
-constexpr const char* kReal = "bac8ad25e760508e18162d568ae9eb85";
+constexpr const char* kReal = "a15170d7565c73b8a8b1a03f86a1113e";
 constexpr const char* kDraftPhysical = "027ac9ab83e003fe77d9803c6b449907";
 constexpr const char* kDraftPaper = "f39d1b64d8ba65288724451ca242d680";
-constexpr const char* kRealPhysical = "d545534925aa389e18aebaf7d01cf079";
-constexpr const char* kRealPaper = "572bd9b614c22e0f0254c53118834cd3";
+constexpr const char* kRealPhysical = "8a6a7191b34194bf07e46048bc72ff90";
+constexpr const char* kRealPaper = "9d091264755ea3c9784d9df979e66233";
 
 class SameBytes : public ::testing::Test {
   protected:
