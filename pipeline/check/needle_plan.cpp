@@ -12,6 +12,8 @@ namespace {
 
 constexpr double kSpareMm = 5;       // length of the needle that stays outside, for the hand
 constexpr double kGoodEnough = 0.9;  // the search ends when this share of a path is seen
+constexpr double kRoomMm = 2;        // about a hand's tremor and a voxel
+constexpr double kRoomWorth = 0.2;   // of visibility: what a path with room may show less
 constexpr double kAboveMm = 40;      // where the search for the skin beside the probe begins
 constexpr double kSteepest = 0.985;  // cosine of 10 degrees: a steeper needle meets the probe
 
@@ -21,6 +23,10 @@ Exercise exercise_of(const AimOptions& options) {
     exercise.probe = options.probe;
     exercise.needle = options.needle;
     return exercise;
+}
+
+bool good_enough(const NeedlePlan& plan) {
+    return plan.roomy && plan.visible > kGoodEnough;
 }
 
 }  // namespace
@@ -76,6 +82,14 @@ bool NeedlePlanner::free(Point3 entry, Vector3 along, double length_mm, int own)
     return true;
 }
 
+bool NeedlePlanner::roomy(const NeedlePlan& plan, double length_mm, int own) const {
+    const Vector3 side = normalized(cross(plan.beam, plan.lateral));
+    const Vector3 other = cross(plan.direction, side);  // the path lies in the picture's plane
+    for (const Vector3 off : {side, -side, other, -other})
+        if (!free(plan.entry + kRoomMm * off, plan.direction, length_mm, own)) return false;
+    return true;
+}
+
 void NeedlePlanner::try_pose(const AimTarget& target,
                              NeedlePlan pose,
                              std::optional<NeedlePlan>& best) const {
@@ -101,8 +115,10 @@ void NeedlePlanner::try_pose(const AimTarget& target,
         pose.visible =
             sight_.visible_mm(mannequin_from_probe, centre, probe_from_mannequin * *entry, 0) /
             length;
-        if (!best || pose.visible > best->visible + 0.02) best = pose;
-        if (best->visible > kGoodEnough) return;
+        pose.roomy = roomy(pose, length, own);
+        const auto worth = [](const NeedlePlan& p) { return p.visible + p.roomy * kRoomWorth; };
+        if (!best || worth(pose) > worth(*best) + 0.02) best = pose;
+        if (good_enough(*best)) return;
     }
 }
 
@@ -121,7 +137,7 @@ std::optional<NeedlePlan> NeedlePlanner::plan(const AimTarget& target,
             pose.beam = std::cos(rocked) * beam + std::sin(rocked) * lateral;
             pose.lateral = std::cos(rocked) * lateral - std::sin(rocked) * beam;
             try_pose(target, pose, best);
-            if (best && best->visible > kGoodEnough) return best;
+            if (best && good_enough(*best)) return best;
         }
     return best;
 }

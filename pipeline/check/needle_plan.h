@@ -20,6 +20,7 @@ struct NeedlePlan {
     Point3 entry;           // of the needle
     Vector3 direction;      // hub to tip, unit
     double visible = 0;     // share of the path that the image shows, by the rules of the scores
+    bool roomy = false;     // nothing that must be kept clear within 2 mm of the path
 };
 
 // Judges a path as the scores do (formats/scoring): labels with their sub-voxel surfaces, tissue
@@ -43,6 +44,7 @@ class NeedlePlanner {
 
   private:
     bool free(Point3 entry, Vector3 along, double length_mm, int own) const;
+    bool roomy(const NeedlePlan& plan, double length_mm, int own) const;
     std::optional<Point3> enter(Point3 above, Vector3 along, double reach_mm) const;
     void try_pose(const AimTarget& target, NeedlePlan pose, std::optional<NeedlePlan>& best) const;
 
