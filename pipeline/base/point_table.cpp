@@ -42,7 +42,8 @@ std::vector<Line> lines_of(std::string_view text) {
         while (!line.empty() && line.back() == ' ') line.remove_suffix(1);
         if (trimmed(line).empty()) continue;
         const bool comment = line.front() == '#' || line.front() == '%' || line.starts_with("//");
-        if (comment) line = trimmed(line.substr(line.find_first_not_of("#%/")));
+        if (comment)
+            line = trimmed(line.substr(std::min(line.find_first_not_of("#%/"), line.size())));
         lines.push_back({number, comment, line});
     }
     return lines;

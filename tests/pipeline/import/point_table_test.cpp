@@ -65,6 +65,7 @@ TEST(PointTable, FindsColumnsByTheirNames) {
         {"units", "x_mm,Y [mm],Z (mm)\n" + csv},
         {"number before", "n,x,y,z,v\n" + numbered},
         {"numpy", "# n,x,y,z,v\n" + numbered},
+        {"signs of comments alone", "#\n%\n# n,x,y,z,v\n#\n//\n" + numbered},
         {"TUM", "# ground truth\n# timestamp tx ty tz qx qy qz qw\n" + tum},
         {"names with commas over blanks", "time,tx,ty,tz,qx,qy,qz,qw\n" + tum},
         {"CloudCompare", "//X Y Z R G B\n" + rows("", " 10 20 30", " ")},
