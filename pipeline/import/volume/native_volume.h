@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
@@ -49,6 +50,14 @@ struct Placement {
     Vector3 spacing_mm{0, 0, 0};  // where the header gives it besides the columns; else 0
     std::vector<std::string> warnings;
 };
+
+// Finite numbers of a header may give places that are not, as their products overflow.
+inline bool is_finite(const Placement& placement) {
+    for (const double entry : placement.columns.m)
+        if (!std::isfinite(entry)) return false;
+    return std::isfinite(placement.origin_mm.x) && std::isfinite(placement.origin_mm.y) &&
+           std::isfinite(placement.origin_mm.z);
+}
 
 struct NativeVolume {
     Grid grid;  // RAS+ mm; orthonormal axes in any order and of any handedness

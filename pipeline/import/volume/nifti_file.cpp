@@ -351,6 +351,7 @@ Status read_placement(Fields& fields,
         placement.spacing_mm = unit * placement.spacing_mm;
         for (int axis = 0; axis < 3; ++axis) placement.origin_mm[axis] *= unit;
     }
+    if (!is_finite(placement)) return not_finite("sform, qform or pixdim", path);
     return Done{};
 }
 

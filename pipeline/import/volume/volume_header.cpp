@@ -441,6 +441,7 @@ Result<Placement> nrrd_placement(std::string_view header, const std::string& pat
                 return Error{"space units of the header differ between axes", path, kWriteAgain};
         SONOCASE_TRY_DONE(scale_to_mm(units[0], "space units", path, placement));
     }
+    if (!is_finite(placement)) return not_finite("axes or origin", path);
     return placement;
 }
 
@@ -517,6 +518,7 @@ Result<Placement> meta_placement(std::string_view header, const std::string& pat
     }
     SONOCASE_TRY_DONE(
         scale_to_mm(field({"DistanceUnits"}).second, "DistanceUnits", path, placement));
+    if (!is_finite(placement)) return not_finite("axes or origin", path);
     return placement;
 }
 
