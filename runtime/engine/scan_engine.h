@@ -50,7 +50,7 @@ struct ToolPoses {
 };
 
 // Applies sensor_from_tool and world_from_mannequin (with its scale). A sensor that is absent or
-// lost, or whose pose is no number, yields no tool. Constant time.
+// lost, or whose pose is not a number, yields no tool. Constant time.
 ToolPoses tool_poses(const TrackerReading& reading,
                      const Calibrations& calibrations,
                      const SensorAssignment& assignment);

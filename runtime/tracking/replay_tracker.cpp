@@ -56,7 +56,7 @@ std::vector<std::size_t> nearest_needles(const Recording& recording) {
     return nearest;
 }
 
-// Leaves out readings whose time falls or is no number; returns their number.
+// Leaves out readings whose time falls or is not a number; returns their number.
 std::size_t drop_falling(std::vector<Pose>& poses) {
     std::vector<Pose> kept;
     kept.reserve(poses.size());

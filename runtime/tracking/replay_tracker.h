@@ -47,9 +47,9 @@ class ReplayTracker final : public Tracker {
 };
 
 // Reads poses to replay: what load_recording_file() reads (formats/files/load_save.h). Readings
-// whose time falls or is no number are left out, and noted. needle_lag_s is taken from the needle's
-// times unless they were recorded in the mannequin. The needle is lost where it has no reading near
-// in time.
+// whose time falls or is not a number are left out, and noted. needle_lag_s is taken from the
+// needle's times unless they were recorded in the mannequin. The needle is lost where it has no
+// reading near in time.
 // Errors: no times; places in metres; no needle's reading at the time of any of the probe's, as of
 // two clocks.
 Result<Recording> load_recording(const std::string& files, double needle_lag_s = 0);

@@ -5,7 +5,7 @@
 // own script, with every machine.
 //
 // To measure instead of judge: SONOCASE_LEVELS="A.sonocase B.sonocase" names bundles and prints the
-// figures alone; SONOCASE_LEVELS_OUT names a folder for the pictures.
+// figures alone, with --gtest_also_run_disabled_tests; SONOCASE_LEVELS_OUT: a folder for pictures.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -237,7 +237,7 @@ class Picture {
 
 // What Auto may ask for where an exercise begins. The opening gain knows the script's place and
 // labels; the start may hold a soft-edged shadow besides.
-constexpr double kMostAutoDb = 5;
+constexpr double kMaxAutoDb = 5;
 
 double least_contrast(const Exercise& exercise) {
     if (exercise.difficulty > 3) return 1;
@@ -280,7 +280,7 @@ void measure(const std::string& path, bool judge) {
             }
             std::printf("\n");
             if (judge && machine == own) {
-                EXPECT_LE(std::abs(auto_db), kMostAutoDb) << name;
+                EXPECT_LE(std::abs(auto_db), kMaxAutoDb) << name;
             }
         }
     }
@@ -294,9 +294,10 @@ std::string cooked(const testing::TemporaryFolder& folder, const std::string& ar
     return path;
 }
 
-TEST(PictureLevels, AsMeasuredInNamedBundles) {
+// Prints and does not judge, hence no part of the tests.
+TEST(PictureLevels, DISABLED_AsMeasuredInNamedBundles) {
     const char* named = std::getenv("SONOCASE_LEVELS");
-    if (named == nullptr) GTEST_SKIP() << "SONOCASE_LEVELS names no bundle";
+    ASSERT_NE(named, nullptr) << "SONOCASE_LEVELS names no bundle";
     std::istringstream paths(named);
     for (std::string path; paths >> path;) measure(path, false);
 }

@@ -371,14 +371,14 @@ std::optional<DicomHeader> read_dicom_header(const std::string& path) {
 }
 
 std::vector<char> inflate_dicom(std::string_view bytes) {
-    constexpr std::size_t kMost = std::size_t{1} << 31;
+    constexpr std::size_t kMaxBytes = std::size_t{1} << 31;
     std::vector<char> out;
     z_stream stream{};
     if (inflateInit2(&stream, -15) != Z_OK) return out;
     stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-    stream.avail_in = static_cast<uInt>(std::min(bytes.size(), kMost));
+    stream.avail_in = static_cast<uInt>(std::min(bytes.size(), kMaxBytes));
     int state = Z_OK;
-    while (state == Z_OK && out.size() < kMost) {
+    while (state == Z_OK && out.size() < kMaxBytes) {
         const std::size_t at = out.size();
         out.resize(std::max<std::size_t>(1 << 16, 2 * at));
         stream.next_out = reinterpret_cast<Bytef*>(out.data() + at);

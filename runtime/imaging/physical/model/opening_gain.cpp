@@ -14,7 +14,7 @@ constexpr double kStepMm = 1;       // along a beam
 constexpr double kSearchMm = 100;   // the skin is looked for this far before and beyond the place
 constexpr double kShadowDb = 24;    // a beam that is so much darker than tissue alone makes it
 constexpr double kFewest = 0.06;    // share of a depth that must hold tissue for it to count
-constexpr double kMostDb = 30;      // limit of what is added at any depth
+constexpr double kMaxDb = 30;       // limit of what is added at any depth
 constexpr double kSheetsDb = 3;     // what the sheets of the wall add to its ground
 constexpr double kMeanOfLogDb = 2;  // a logarithm's mean lies so far below that of the amplitude
 
@@ -152,7 +152,7 @@ OpeningGain opening_gain(const PhysicalScene& scene,
     for (std::size_t i = 0; i < 8; ++i) {
         const double above = zones[i > 0 ? i - 1 : 0],
                      below = zones[std::min<std::size_t>(i + 1, 7)];
-        out.db[i] = std::clamp(0.25 * above + 0.5 * zones[i] + 0.25 * below, -kMostDb, kMostDb);
+        out.db[i] = std::clamp(0.25 * above + 0.5 * zones[i] + 0.25 * below, -kMaxDb, kMaxDb);
     }
     return out;
 }
