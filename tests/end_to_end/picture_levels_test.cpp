@@ -237,12 +237,10 @@ class Picture {
 
 // What Auto may ask for where an exercise begins. The opening gain knows the script's place and
 // labels; the start may hold a soft-edged shadow besides.
-constexpr double kMaxAutoDb = 5;
+constexpr double kMaxAutoDb = 4;
 
 double least_contrast(const Exercise& exercise) {
-    if (exercise.difficulty > 3) return 1;
-    // A vein lies among septa as bright as its walls.
-    return exercise.targets[0].look == TargetLook::none ? 1.4 : 1.5;
+    return exercise.difficulty > 3 ? 1 : 1.5;
 }
 
 void measure(const std::string& path, bool judge) {
