@@ -15,6 +15,8 @@ namespace {
 constexpr double kCutting = 0.25;       // share of the dent that is left after a puncture
 constexpr double kUnderSkinMm = 5;      // depth at which the stiffness under the skin is taken
 constexpr double kFarthestWallMm = 40;  // from one wall of a lumen to the other
+constexpr double kThinMm = 0.5;         // along the needle: less may be a voxel's corner
+constexpr double kVoxelMm = 2;          // of the coarsest bundles
 
 // Newtons per mm of dent: 4 pi (E / 3) w, E in N/mm^2.
 double spring_of(double stiffness_kpa) {
@@ -76,6 +78,26 @@ void NeedlePuncture::touch(int layer, const LayersAlong& layers) {
         ++far_wall_;
 }
 
+// Whether `layer` is but the corner of a voxel on a wall that the needle runs along: thin, with the
+// tip's own tissue behind it, and, unless that is a lumen, with `layer` again within a voxel. A
+// closed vein, thin as it is, has muscle behind it and no second lumen. Bone and skin are never
+// corners.
+bool NeedlePuncture::is_corner(int layer, const LayersAlong& layers) const {
+    const NeedleLayer& before = layers.layer(layers.context, inside_);
+    if (layers.layer(layers.context, layer).rigid || before.outside) return false;
+    const auto thin = static_cast<std::int64_t>(kThinMm / kStepMm);
+    const auto voxel = static_cast<std::int64_t>(kVoxelMm / kStepMm);
+    const auto at = [&](std::int64_t n) {
+        return layers.index(layers.context, at_step(step_ + n));
+    };
+    std::int64_t n = 1;
+    while (n <= thin && at(n) != inside_) ++n;
+    if (n > thin) return false;
+    if (before.lumen) return true;
+    while (n <= voxel && at(n) != layer) ++n;
+    return n <= voxel;
+}
+
 void NeedlePuncture::puncture(const LayersAlong& layers) {
     const NeedleLayer& layer = layers.layer(layers.context, touched_);
     add_event(NeedleEventKind::puncture, touched_);
@@ -101,7 +123,7 @@ void NeedlePuncture::forward(const LayersAlong& layers) {
     drag_mm_ = std::min(drag_mm_ + kStepMm, kMaxDragMm);
     if (touched_ < 0) {
         const int here = layers.index(layers.context, at_step(step_));
-        if (here == inside_) return;
+        if (here == inside_ || is_corner(here, layers)) return;
         touch(here, layers);
     }
     const NeedleLayer& next = layers.layer(layers.context, touched_);

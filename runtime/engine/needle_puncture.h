@@ -91,6 +91,7 @@ class NeedlePuncture {
     void begin(std::int64_t step, const LayersAlong& layers);
     void forward(const LayersAlong& layers);
     void backward();
+    bool is_corner(int layer, const LayersAlong& layers) const;
     void touch(int layer, const LayersAlong& layers);
     void puncture(const LayersAlong& layers);
     void add_event(NeedleEventKind kind, int layer);

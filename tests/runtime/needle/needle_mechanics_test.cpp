@@ -203,6 +203,22 @@ TEST(NeedlePuncture, AClosedVeinIsPuncturedThroughBothWallsAtOnce) {
     }
 }
 
+TEST(NeedlePuncture, TheCornerOfAVoxelIsNoWall) {
+    // A needle that runs along a vein's wall meets its steps: slivers of vein before the lumen, of
+    // muscle within it.
+    Track track = groin(8);
+    track.boundaries = {{0, kSkinLayer},    {2, kFatLayer},       {10, kMuscleLayer},
+                        {17.1, kVeinLayer}, {17.2, kMuscleLayer}, {18, kVeinLayer},
+                        {21, kMuscleLayer}, {21.3, kVeinLayer},   {30, kMuscleLayer},
+                        {45, kBoneLayer}};
+    NeedlePuncture needle;
+    const std::string into = follow(needle, track, line(-2, 25, 0.1));
+    EXPECT_EQ(count_of(into, "puncture 4"), 1) << into;
+    EXPECT_EQ(count_of(into, "posterior"), 0) << into;
+    EXPECT_EQ(needle.tip_layer(), kVeinLayer);
+    EXPECT_EQ(count_of(follow(needle, track, line(25, 40, 0.1)), "posterior 4"), 1);
+}
+
 TEST(NeedlePuncture, TremblingMakesNoEvents) {
     NeedlePuncture needle;
     const Track track = groin(8);
