@@ -60,8 +60,12 @@ void read_probe(const TomlTable& table, Probe& probe) {
 }
 
 void read_needle(const TomlTable& table, NeedleModel& needle) {
-    table.number("gauge", needle.gauge, 6, 34);
-    table.number("diameter_mm", needle.diameter_mm, 0, 10);
+    const bool gauge = table.number("gauge", needle.gauge, 6, 34);
+    const bool diameter = table.number("diameter_mm", needle.diameter_mm, 0, 10);
+    if (const auto make = table.choice("make", needle_make_names())) {
+        needle.make = &needle_makes()[*make];
+        if (!gauge && !diameter) needle.diameter_mm = needle.make->diameter_mm;
+    }
     table.number("length_mm", needle.length_mm, 1, 1000);
     table.number("slab_mm", needle.slab_mm, 0, 50);
     table.number("tip_visibility", needle.tip_visibility, 0, 1);

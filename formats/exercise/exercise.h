@@ -12,6 +12,7 @@
 
 #include "formats/base/geometry.h"
 #include "formats/base/result.h"
+#include "formats/exercise/needle_makes.h"
 
 namespace sonocase {
 
@@ -31,7 +32,8 @@ struct Probe {
 };
 
 struct NeedleModel {
-    double gauge = 18;  // used for the diameter if diameter_mm is 0
+    const NeedleMake* make = &needle_makes().front();  // how it shows; never null
+    double gauge = 18;                                 // used for the diameter if diameter_mm is 0
     double diameter_mm = 0;
     double length_mm = 150;
     double slab_mm = 0;           // thickness t of the scan plane for the needle; 0: its diameter

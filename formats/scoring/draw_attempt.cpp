@@ -19,9 +19,13 @@ constexpr int kDifficulties[] = {0, -1, -2, 1, 2};
 
 struct Factors {
     double spread, start, size;
+    const char* make;  // of a needle as exercises have it without a word; null: as it is
 };
-constexpr Factors kFactors[] = {
-    {0.4, 0.6, 1}, {0.7, 0.8, 1}, {1, 1, 1}, {1, 1.2, 0.85}, {1, 1.4, 0.7}};
+constexpr Factors kFactors[] = {{0.4, 0.6, 1, "notched"},
+                                {0.7, 0.8, 1, nullptr},
+                                {1, 1, 1, nullptr},
+                                {1, 1.2, 0.85, nullptr},
+                                {1, 1.4, 0.7, nullptr}};
 
 }  // namespace
 
@@ -49,6 +53,8 @@ void apply_difficulty(int difficulty, Exercise& exercise) {
         if (target.look != TargetLook::none) target.radius_mm *= by.size;
     }
     exercise.start_spread_mm *= by.start;
+    if (by.make != nullptr && exercise.needle.make == &needle_makes().front())
+        exercise.needle.make = find_needle_make(by.make);
 }
 
 namespace {

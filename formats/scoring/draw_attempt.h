@@ -34,6 +34,7 @@ std::uint64_t seed_with_difficulty(std::uint64_t seed, int difficulty);
 //       1            1                         1.2                              0.85
 //       2            1                         1.4                              0.7
 //
+// At -2 a needle of the default make becomes a notched one, which is bright at every angle.
 // Drawn lesions shrink with the radius of a hit; structures of the anatomy keep their size. Pass
 // marks stay as they are written, so that a pass means the same at every difficulty, apart from
 // where the target lay.

@@ -39,15 +39,20 @@ struct LookUp {
             const Point3 t = probe_from_mannequin * tip;
             r.plane_mm = t.y;
             read_in_picture(sample.mannequin_from_probe, point.time_s, t,
-                            probe_from_mannequin * direction, &r);
+                            probe_from_mannequin * direction,
+                            probe_from_mannequin * point.pose.rotation.column(0), &r);
         }
         return r;
     }
 
-    // axis: of the needle, `probe` frame.
-    void read_in_picture(
-        const Rigid& pose, double time_s, Point3 tip, Vector3 axis, NeedleReading* r) const {
-        r->tip_in_view = sight.tip_visible(pose, tip, axis, time_s);
+    // axis, bevel: of the needle, `probe` frame.
+    void read_in_picture(const Rigid& pose,
+                         double time_s,
+                         Point3 tip,
+                         Vector3 axis,
+                         Vector3 bevel,
+                         NeedleReading* r) const {
+        r->tip_in_view = sight.tip_visible(pose, tip, axis, bevel, time_s);
         r->on_the_way = sight.on_the_way(tip, axis);
         if (!(r->depth_mm > 0)) return;
         const Point3 skin = tip - r->depth_mm * axis;

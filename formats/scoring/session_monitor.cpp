@@ -212,7 +212,8 @@ std::span<const LiveEvent> SessionMonitor::update(double time_s,
         const Rigid probe_from = inverse(mannequin_from_probe);
         tip_in_view_ =
             sight_.tip_visible(mannequin_from_probe, probe_from * tip,
-                               probe_from * mannequin_from_drawn.rotation.column(2), time_s);
+                               probe_from * mannequin_from_drawn.rotation.column(2),
+                               probe_from * mannequin_from_drawn.rotation.column(0), time_s);
     }
     if (anatomy_ && needle_ok) watch_needle(time_s, mannequin_from_drawn);
     watch_targets(time_s, probe_ok, mannequin_from_probe, needle_ok, tip);

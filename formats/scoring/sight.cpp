@@ -100,8 +100,8 @@ constexpr double kBoneFloor = 0.075, kBoneFade = 0.98895, kGasTail = 1.4, kGasFa
 constexpr double kApertureMm = 17, kPenumbraMm = 90;
 // A needle is thicker than a pulse: its echo, relative to liver's, grows with the roots of its
 // diameter, mm, and of the frequency, MHz.
-constexpr double kNeedleEcho = 8, kNeedleDiffuse = 0.035, kOwnShade = 0.35, kTipGlint = 0.04,
-                 kTipGlintMm = 1;
+constexpr double kNeedleEcho = 8, kOwnShade = 0.35;
+constexpr double kLn2 = 0.69314718055994531;
 constexpr double kLiverGrey = 80;
 
 // A scan line: where it leaves the face, and its direction; `probe` frame.
@@ -192,7 +192,10 @@ bool sound_reaches(const Anatomy& anatomy,
 }
 
 NeedleSight::NeedleSight(const Anatomy* anatomy, const Exercise& exercise)
-    : anatomy_(anatomy), probe_(exercise.probe), length_mm_(exercise.needle.length_mm) {
+    : anatomy_(anatomy),
+      probe_(exercise.probe),
+      make_(exercise.needle.make),
+      length_mm_(exercise.needle.length_mm) {
     const double own = exercise.model == "paper" ? needle_diameter_mm(exercise.needle)
                                                  : exercise.probe.elevation_mm;
     half_slab_mm_ = 0.5 * (exercise.needle.slab_mm > 0 ? exercise.needle.slab_mm : own);
@@ -280,6 +283,7 @@ double lit_with_penumbra(const Anatomy& anatomy,
 double NeedleSight::contrast(const Rigid& mannequin_from_probe,
                              Point3 p_probe,
                              Vector3 axis_probe,
+                             Vector3 bevel_probe,
                              double from_tip_mm,
                              double time_s) const {
     const ScanLine line = scan_line(probe_, p_probe);
@@ -292,12 +296,15 @@ double NeedleSight::contrast(const Rigid& mannequin_from_probe,
     }
     const double cosine = dot(axis_probe, line.along);
     const double sine2 = std::max(1 - cosine * cosine, 0.0);
-    const double mirror = sine2 * sine2 * sine2 * sine2 * sine2 * sine2;
+    const double mirror =
+        exponential(-kLn2 * cosine * cosine / (make_->lobe_sin * make_->lobe_sin));
+    const double faces =
+        std::clamp(-dot(bevel_probe, line.along) / std::sqrt(std::max(sine2, 0.01)), -1.0, 1.0);
+    const double tip = make_->tip_away + (make_->tip_towards - make_->tip_away) * 0.5 * (1 + faces);
+    const double base = make_->rough + (tip - make_->rough) * needle_tip_part(from_tip_mm);
     // The needle shades its own far side, the more of it the steeper it runs along the beam.
     const double shade = 1 / (1 + kOwnShade / std::sqrt(std::max(sine2, 0.01)));
-    const double needle = shade * light.lit * echo_ *
-                          (kNeedleDiffuse + (1 - kNeedleDiffuse) * mirror +
-                           kTipGlint * std::max(1 - from_tip_mm / kTipGlintMm, 0.0));
+    const double needle = shade * light.lit * echo_ * (base + (1 - base) * mirror);
     const double tissue = light.lit * light.echo;
     const double around = tissue * tissue + light.bone * light.bone + light.gas * light.gas;
     return grey(around + needle * needle) - grey(around);
@@ -306,10 +313,11 @@ double NeedleSight::contrast(const Rigid& mannequin_from_probe,
 bool NeedleSight::tip_visible(const Rigid& mannequin_from_probe,
                               Point3 tip,
                               Vector3 axis,
+                              Vector3 bevel,
                               double time_s) const {
     if (!(std::abs(tip.y) <= half_slab_mm_) || !in_image(probe_, tip.x, tip.z)) return false;
     return anatomy_ == nullptr || !anatomy_->knows_tissue() ||
-           contrast(mannequin_from_probe, tip, axis, 0, time_s) >= kShownGrey;
+           contrast(mannequin_from_probe, tip, axis, bevel, 0, time_s) >= kShownGrey;
 }
 
 double NeedleSight::visible_mm(const Rigid& mannequin_from_probe,
@@ -324,7 +332,8 @@ double NeedleSight::visible_mm(const Rigid& mannequin_from_probe,
     int seen = 0;
     for (int i = 0; i < points; ++i) {
         const double at = part.low + (part.high - part.low) * (i + 0.5) / points;
-        if (contrast(mannequin_from_probe, tip + at * (skin - tip), axis, at * whole, time_s) >=
+        // Of the shaft: what the bevel adds at the tip counts as the tip.
+        if (contrast(mannequin_from_probe, tip + at * (skin - tip), axis, {}, at * whole, time_s) >=
             kShownGrey)
             ++seen;
     }

@@ -62,8 +62,8 @@ bool sound_reaches(const Anatomy& anatomy,
 // echo stands out of what is around it by kShownGrey. Both echoes are dimmed by the tissue before
 // them, as in model `physical`: a needle in the shadow of thin bone may show, and one behind the
 // edge of the face that has no contact does not. The needle's echo follows the angle between beam
-// and shaft; the tip glints at every angle. Where the anatomy is null or knows no tissues, whatever
-// lies in the image is visible.
+// and shaft, its tip also the side that the bevel faces, as its make has them. Where the anatomy is
+// null or knows no tissues, whatever lies in the image is visible.
 class NeedleSight {
   public:
     static constexpr double kShownGrey = 7.5;  // of 255, where liver has 80
@@ -72,16 +72,19 @@ class NeedleSight {
     NeedleSight(const Anatomy* anatomy, const Exercise& exercise);
 
     // Grey levels by which a point of the needle stands out. axis_probe: unit, hub to tip;
-    // from_tip_mm: back along the shaft. 0 where no sound comes. Whether the point lies in the
-    // image does not matter. Cost: that of sound_reaches().
+    // bevel_probe: unit, the side that the bevel faces; from_tip_mm: back along the shaft. 0 where
+    // no sound comes. Whether the point lies in the image does not matter. Cost: that of
+    // sound_reaches().
     double contrast(const Rigid& mannequin_from_probe,
                     Point3 p_probe,
                     Vector3 axis_probe,
+                    Vector3 bevel_probe,
                     double from_tip_mm,
                     double time_s) const;
     bool tip_visible(const Rigid& mannequin_from_probe,
                      Point3 tip_probe,
                      Vector3 axis_probe,
+                     Vector3 bevel_probe,
                      double time_s) const;
     // Length of the shaft from tip to skin (`probe` frame) that is visible; tried every
     // kSightShaftMm.
@@ -100,6 +103,7 @@ class NeedleSight {
   private:
     const Anatomy* anatomy_;
     Probe probe_;
+    const NeedleMake* make_;
     double length_mm_ = 0, half_slab_mm_ = 0, echo_ = 0;
 };
 

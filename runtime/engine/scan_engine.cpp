@@ -163,6 +163,7 @@ FrameStatus ScanEngine::frame(double now_s,
         const Rigid& needle = record.needle.mannequin_from_drawn;
         input.needle.tip = needle * Point3{0, 0, 0};
         input.needle.direction = needle.rotation.column(2);
+        input.needle.bevel = needle.rotation.column(0);
     }
     input.time_s = time_s;
     input.frame = frame_++;

@@ -120,7 +120,10 @@ bool needle_shown(const FrameInput& input, const NeedleModel& model, NeedleShape
         !(norm(d) > 0.5))
         return false;
     const Rigid probe_from_mannequin = inverse(input.mannequin_from_probe);
-    needle = needle_shape(model, probe_from_mannequin * tip, normalized(probe_from_mannequin * d));
+    const Vector3 bevel = input.needle.bevel;
+    needle =
+        needle_shape(model, probe_from_mannequin * tip, normalized(probe_from_mannequin * d),
+                     finite(bevel.x, bevel.y, bevel.z) ? probe_from_mannequin * bevel : Vector3{});
     return needle.radius_mm > 0 && std::isfinite(needle.slab_mm);
 }
 

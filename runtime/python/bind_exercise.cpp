@@ -78,6 +78,9 @@ void bind_targets(py::module_& module) {
         .def_readonly("inside", &Target::inside, "Label that it lies in; '': any.")
         .def("__repr__", [](const Target& t) { return "<sonocase.Target " + t.name + ">"; });
     py::class_<NeedleModel>(module, "Needle", "A needle as an exercise describes it.")
+        .def_property_readonly(
+            "make", [](const NeedleModel& n) { return n.make->name; },
+            "How it shows (docs/format.md).")
         .def_readonly("gauge", &NeedleModel::gauge)
         .def_property_readonly("diameter_mm",
                                [](const NeedleModel& n) { return needle_diameter_mm(n); })

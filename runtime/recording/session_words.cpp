@@ -42,7 +42,8 @@ SessionHeader session_header(const CaseBundle& bundle,
         std::string("model=") + (render.model == ImageModel::paper ? "paper" : "physical") +
         (render.machine ? " machine=" + render.machine->name : "") +
         " effects=" + joined(render.effects) + " size=" + std::to_string(render.width_px) + "x" +
-        std::to_string(render.height_px) + " seed=" + std::to_string(render.seed);
+        std::to_string(render.height_px) + " seed=" + std::to_string(render.seed) +
+        " needle=" + exercise.needle.make->name;
     return header;
 }
 

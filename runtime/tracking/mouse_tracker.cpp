@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/base/constants.h"
 #include "runtime/tracking/scripted_sweep.h"
 
 namespace sonocase::runtime::inline tracking {
@@ -118,6 +119,7 @@ bool MouseTracker::place_needle(Point3 near, Vector3 towards) {
     entry_ = *touch;
     shaft_ = norm(normal) > 0.5 ? -normal : normalized(towards);
     depth_mm_ = -5;
+    roll_rad_ = 0;
     has_needle_ = true;
     changed_ = true;
     return true;
@@ -159,6 +161,12 @@ bool MouseTracker::aim_needle_at(Point3 p) {
     return true;
 }
 
+void MouseTracker::roll_needle(double angle_rad) {
+    if (!has_needle_) return;
+    roll_rad_ = std::remainder(roll_rad_ + angle_rad, 2 * kPi);
+    changed_ = true;
+}
+
 void MouseTracker::advance_needle(double mm) {
     if (!has_needle_) return;
     depth_mm_ = std::clamp(depth_mm_ + mm, -kNeedleHover, needle_length_mm_);
@@ -180,7 +188,10 @@ void MouseTracker::withdraw_needle() {
 }
 
 Rigid MouseTracker::mannequin_from_needle() const {
-    return frame_along(entry_ + depth_mm_ * shaft_, shaft_, any_perpendicular(shaft_));
+    const Vector3 to_probe = -mannequin_from_probe().rotation.column(2);
+    Rigid needle = frame_along(entry_ + depth_mm_ * shaft_, shaft_, to_probe);
+    needle.rotation = needle.rotation * rotation_about({0, 0, 1}, roll_rad_);
+    return needle;
 }
 
 bool MouseTracker::poll(double now_s, TrackerReading& reading) {

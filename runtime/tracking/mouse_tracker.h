@@ -42,7 +42,8 @@ class MouseTracker final : public Tracker {
     // Turns the needle about its entry, so that pushed on it meets p. False: no needle, or p lies
     // outside the skin at the entry.
     bool aim_needle_at(Point3 p);
-    void advance_needle(double mm);  // > 0 deeper; limited to [-60 mm, the needle's length]
+    void roll_needle(double angle_rad);  // about its axis; it is taken with the bevel to the probe
+    void advance_needle(double mm);      // > 0 deeper; limited to [-60 mm, the needle's length]
     void slide_needle(double lateral_mm, double elevation_mm);  // only while it is not inserted
     void withdraw_needle();                                     // takes it away
 
@@ -66,6 +67,7 @@ class MouseTracker final : public Tracker {
     Vector3 lateral_{1, 0, 0};  // in the skin's tangent plane, before rock and fan
     double rock_rad_ = 0, fan_rad_ = 0, press_mm_ = 1;
     bool has_needle_ = false;
+    double roll_rad_ = 0;
     Point3 entry_;
     Vector3 shaft_{0, 0, -1};
     double depth_mm_ = 0;

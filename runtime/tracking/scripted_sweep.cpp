@@ -75,8 +75,8 @@ SweepPose sweep_pose(const Sweep& sweep, double time_s, const Skin* skin) {
     }
     pose.mannequin_from_probe = frame_along(face, beam, lateral);
     if (pose.has_needle) {
-        pose.mannequin_from_needle =
-            frame_along(as_point(tip), shaft, any_perpendicular(normalized(shaft)));
+        // The bevel faces the probe, as an expert holds it.
+        pose.mannequin_from_needle = frame_along(as_point(tip), shaft, -beam);
     }
     return pose;
 }

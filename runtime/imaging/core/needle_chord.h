@@ -29,11 +29,17 @@ struct NeedleShape {
     double length_mm = 150;
     double slab_mm = 1;  // t; 0 is treated as a thin slab of kMinSlabMm
     double tip_opacity = 1, shaft_opacity = 1;
+    Vector3 bevel{0, 0, -1};  // unit: the side that the bevel faces
+    const NeedleMake* make = &needle_makes().front();
 };
 
 inline constexpr double kMinSlabMm = 1e-3;
 
-inline NeedleShape needle_shape(const NeedleModel& model, Point3 tip_probe, Vector3 axis_probe) {
+// bevel_probe: zero where it faces the probe.
+inline NeedleShape needle_shape(const NeedleModel& model,
+                                Point3 tip_probe,
+                                Vector3 axis_probe,
+                                Vector3 bevel_probe = {}) {
     const double diameter = needle_diameter_mm(model);
     return {.tip = tip_probe,
             .axis = axis_probe,
@@ -41,7 +47,9 @@ inline NeedleShape needle_shape(const NeedleModel& model, Point3 tip_probe, Vect
             .length_mm = model.length_mm,
             .slab_mm = std::max(model.slab_mm > 0 ? model.slab_mm : diameter, kMinSlabMm),
             .tip_opacity = model.tip_visibility,
-            .shaft_opacity = model.shaft_visibility};
+            .shaft_opacity = model.shaft_visibility,
+            .bevel = norm(bevel_probe) > 0.5 ? bevel_probe : Vector3{0, 0, -1},
+            .make = model.make};
 }
 
 // Share in [0, 1]; `along` receives the distance from the tip back along the shaft, mm, >= 0.
@@ -82,6 +90,8 @@ struct NeedleRow {
     alignas(64) float direction_x[kBeamBlock];
     alignas(64) float direction_z[kBeamBlock];
     float step, wy, ax, ay, az, a, radius, length, slab, tip_opacity, shaft_opacity, inverse_reach;
+    float bevel_x, bevel_z, rough, inverse_lobe2, tip_middle,
+        tip_swing;  // NeedleMake, model physical
 };
 
 // The part of the needle that the slab can show, projected on the plane: a segment with a radius.
@@ -174,6 +184,13 @@ class NeedleStrip {
         row.tip_opacity = static_cast<float>(n.tip_opacity);
         row.shaft_opacity = static_cast<float>(n.shaft_opacity);
         row.inverse_reach = static_cast<float>(1 / kTipReachMm);
+        const NeedleMake& make = *n.make;
+        row.bevel_x = static_cast<float>(n.bevel.x);
+        row.bevel_z = static_cast<float>(n.bevel.z);
+        row.rough = static_cast<float>(make.rough);
+        row.inverse_lobe2 = static_cast<float>(1 / (make.lobe_sin * make.lobe_sin));
+        row.tip_middle = static_cast<float>(0.5 * (make.tip_towards + make.tip_away));
+        row.tip_swing = static_cast<float>(0.5 * (make.tip_towards - make.tip_away));
         return true;
     }
 

@@ -335,7 +335,9 @@ bool TruthRenderer::Impl::needle_shape_of(const FrameInput& input, NeedleShape& 
                         std::isfinite(d.x) && std::isfinite(d.y) && std::isfinite(d.z);
     if (!input.has_needle || !finite || !(norm(d) > 0.5)) return false;
     const Rigid probe_from_mannequin = inverse(input.mannequin_from_probe);
-    shape = needle_shape(needle, probe_from_mannequin * tip, normalized(probe_from_mannequin * d));
+    const Vector3 bevel = input.needle.bevel;
+    shape = needle_shape(needle, probe_from_mannequin * tip, normalized(probe_from_mannequin * d),
+                         std::isfinite(norm(bevel)) ? probe_from_mannequin * bevel : Vector3{});
     return shape.radius_mm > 0 && std::isfinite(shape.slab_mm);
 }
 
@@ -357,7 +359,7 @@ void TruthRenderer::Impl::needle_facts(const FrameInput& input) {
     truth.tip_probe = shape.tip;
     const double half_slab = 0.5 * shape.slab_mm;
     const Rigid& pose = input.mannequin_from_probe;
-    truth.tip_visible = sight.tip_visible(pose, shape.tip, shape.axis, truth.time_s);
+    truth.tip_visible = sight.tip_visible(pose, shape.tip, shape.axis, shape.bevel, truth.time_s);
     truth.needle_visible_mm =
         sight.visible_mm(pose, shape.tip, shape.tip - shape.length_mm * shape.axis, truth.time_s);
     truth.tip_in_plane =

@@ -313,10 +313,11 @@ void note_steps(const Exercise& exercise,
     const Point3 drawn = record.needle.mannequin_from_drawn * Point3{0, 0, 0};
     const Point3 tip = probe_from * drawn;
     const Vector3 axis = probe_from * record.needle.mannequin_from_drawn.rotation.column(2);
+    const Vector3 bevel = probe_from * record.needle.mannequin_from_drawn.rotation.column(0);
     if (!done.needle_seen)
         done.needle_seen =
             sight.visible_mm(pose, tip, tip - record.needle.depth_mm * axis, now_s) >= kShaftMm;
-    if (!done.needle_seen || !sight.tip_visible(pose, tip, axis, now_s)) return;
+    if (!done.needle_seen || !sight.tip_visible(pose, tip, axis, bevel, now_s)) return;
     for (const Point3& centre : centres)
         done.tip_near = done.tip_near || distance(drawn, centre) < kNearMm;
 }

@@ -94,8 +94,11 @@ std::string exercise_toml(const Exercise& base,
     if (probe.shape != ProbeShape::curvilinear) out += line("width_mm = %.4g\n", probe.width_mm);
     out += line("depth_mm = %.5g\nfrequency_mhz = %.4g\nfocus_mm = %.5g\n", probe.depth_mm,
                 probe.frequency_mhz, probe.focus_mm);
-    out += line("\n[needle]\ngauge = %.4g\nlength_mm = %.5g\n", base.needle.gauge,
-                base.needle.length_mm);
+    const NeedleModel& needle = base.needle;
+    out += std::string("\n[needle]\nmake = \"") + needle.make->name + "\"\n";
+    out += needle.diameter_mm > 0 ? line("diameter_mm = %.4g\n", needle.diameter_mm)
+                                  : line("gauge = %.4g\n", needle.gauge);
+    out += line("length_mm = %.5g\n", needle.length_mm);
     out += "\n[[targets]]\nname = " + quoted(title) + "\n";
     out += line("centre = [%.2f, %.2f, %.2f]\n", centre.x, centre.y, centre.z);
     out += line("radius_mm = %.3g\nhit_radius_mm = %.3g\nlook = \"lesion\"\n", radius_mm,

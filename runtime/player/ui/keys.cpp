@@ -29,6 +29,7 @@ std::span<const Shortcut> shortcuts() {
         {"N  Shift + N", "take or withdraw, in plane or across"},
         {"W  S  Shift + wheel", "advance and pull back"},
         {"A  D  Z  X  Shift + drag", "aim in the plane and out of it"},
+        {"Shift + A  D", "roll it: its tip shows best with the bevel towards the probe"},
         {"Shift + I J K L", "move its entry while it is outside"},
         {nullptr, "Picture"},
         {"Space", "freeze"},
@@ -104,7 +105,9 @@ void move_needle(MouseTracker& mouse, bool flipped, double seconds) {
     const double slow = io.KeyAlt ? 0.25 : 1;
     if (const double in = axis(GLFW_KEY_S, GLFW_KEY_W))
         mouse.advance_needle(25 * slow * in * seconds);
-    const double aim = axis(GLFW_KEY_A, GLFW_KEY_D), out = axis(GLFW_KEY_Z, GLFW_KEY_X);
+    const double turn = axis(GLFW_KEY_A, GLFW_KEY_D), out = axis(GLFW_KEY_Z, GLFW_KEY_X);
+    if (io.KeyShift && turn != 0) mouse.roll_needle(1.5 * slow * turn * seconds);
+    const double aim = io.KeyShift ? 0 : turn;
     if (aim != 0 || out != 0)
         mouse.aim_needle(0.35 * slow * (flipped ? -aim : aim) * seconds,
                          0.35 * slow * out * seconds);

@@ -128,6 +128,8 @@ void draw_values(Ui& ui, Box& room, const TaskCardInput& input) {
         if (!input.target_centres.empty())
             row("Tip to target", needle ? text("%.0f mm", nearest) : "–", colour::kText);
     }
+    if (needle && input.exercise.needle.make->echogenic && room.h >= 34)
+        draw_small(ui, room, tr(input.exercise.needle.make->about), kRow);
     if (!input.attempt) {
         if (input.exam) return;
         row("Needle depth",

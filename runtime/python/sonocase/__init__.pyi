@@ -36,6 +36,7 @@ class Probe:
                  focus_mm: float = ..., elevation_mm: float = ...) -> None: ...
 
 class Needle:
+    make: str
     gauge: float
     diameter_mm: float
     length_mm: float

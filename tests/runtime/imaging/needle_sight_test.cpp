@@ -100,7 +100,7 @@ void compare_with_frames(const CaseBundle& bundle,
         const Point3 end = tip - 2 * axis;
         if (in_image(exercise.probe, tip.x, tip.z) && in_image(exercise.probe, end.x, end.z))
             tips.add(rise(with, without, renderer->layout(), tip, end),
-                     sight.tip_visible(pose, tip, axis, 0), what);
+                     sight.tip_visible(pose, tip, axis, {0, 0, -1}, 0), what);
         for (double back = 3; back < 100; back += 2 * kStretchMm) {
             const Point3 a = tip - back * axis, b = tip - (back + kStretchMm) * axis;
             if (!in_image(exercise.probe, a.x, a.z) || !in_image(exercise.probe, b.x, b.z))
@@ -108,8 +108,8 @@ void compare_with_frames(const CaseBundle& bundle,
             // A stretch across a shadow's edge goes by the larger part of it.
             int parts = 0;
             for (const double part : {0.1, 0.3, 0.5, 0.7, 0.9})
-                parts += sight.contrast(pose, a + part * (b - a), axis, back + part * kStretchMm,
-                                        0) >= NeedleSight::kShownGrey;
+                parts += sight.contrast(pose, a + part * (b - a), axis, {0, 0, -1},
+                                        back + part * kStretchMm, 0) >= NeedleSight::kShownGrey;
             shafts.add(rise(with, without, renderer->layout(), a, b), parts >= 3, what);
         }
     }

@@ -107,16 +107,23 @@ void needle_physical(PhysicalBlock& b, const NeedleRow& n, int row_begin, int ro
     const int lanes = static_cast<int>(hn::Lanes(d));
     const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f);
     const float diameter = 2 * n.radius;
+    const float per_line = b.step_mm / diameter;
     const float decay = std::exp(-b.step_mm / static_cast<float>(kNeedleTailMm));
     const float dim = static_cast<float>(kNeedleShadowLog2) * std::min(b.step_mm / diameter, 1.0f);
     for (int v = 0; v < kBeamBlock; v += lanes) {
         const auto ox = hn::LoadU(d, n.origin_x + v), oz = hn::LoadU(d, n.origin_z + v);
         const auto dx = hn::LoadU(d, n.direction_x + v), dz = hn::LoadU(d, n.direction_z + v);
         const auto cosine = hn::Add(hn::Mul(hn::Set(d, n.ax), dx), hn::Mul(hn::Set(d, n.az), dz));
-        const auto sine2 = hn::Max(hn::Sub(one, hn::Mul(cosine, cosine)), zero);
-        const auto sine4 = hn::Mul(sine2, sine2);
-        const auto mirror = hn::Mul(hn::Mul(sine4, sine4), sine4);  // sine^12
-        auto tail = zero, shade = zero;
+        const auto cosine2 = hn::Mul(cosine, cosine);
+        const auto mirror = exp2_fading(d, hn::Mul(cosine2, hn::Set(d, -n.inverse_lobe2)));
+        const auto rough = hn::Set(d, n.rough);
+        const auto sine = hn::Sqrt(hn::Max(hn::Sub(one, cosine2), hn::Set(d, 0.01f)));
+        const auto faces = hn::Neg(hn::Div(
+            hn::Add(hn::Mul(hn::Set(d, n.bevel_x), dx), hn::Mul(hn::Set(d, n.bevel_z), dz)), sine));
+        const auto tip = hn::Add(
+            hn::Set(d, n.tip_middle),
+            hn::Mul(hn::Set(d, n.tip_swing), hn::Max(hn::Min(faces, one), hn::Set(d, -1.0f))));
+        auto tail = zero, shade = zero, lines = zero;
         for (int k = row_begin; k < b.samples; ++k) {
             const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(k) * b.stride + v;
             tail = hn::Mul(tail, hn::Set(d, decay));
@@ -128,14 +135,10 @@ void needle_physical(PhysicalBlock& b, const NeedleRow& n, int row_begin, int ro
                 const auto seen = hn::Min(
                     hn::IfThenElseZero(chord.hit, hn::Div(chord.length_mm, hn::Set(d, diameter))),
                     one);
-                const auto glint = hn::Mul(
-                    hn::Set(d, 0.25f),
-                    hn::Max(hn::Sub(one, hn::Mul(chord.from_tip_mm,
-                                                 hn::Set(d, static_cast<float>(1 / kTipGlintMm)))),
-                            zero));
-                const auto rough = hn::Set(d, static_cast<float>(kNeedleDiffuse));
-                const auto bright =
-                    hn::Add(hn::Add(rough, hn::Mul(hn::Sub(one, rough), mirror)), glint);
+                const auto tip_part =
+                    hn::Max(hn::Min(hn::Sub(hn::Set(d, 2.0f), chord.from_tip_mm), one), zero);
+                const auto base = hn::Add(rough, hn::Mul(hn::Sub(tip, rough), tip_part));
+                const auto bright = hn::Add(base, hn::Mul(hn::Sub(one, base), mirror));
                 const auto strength = hn::Mul(seen, hn::Set(d, static_cast<float>(kNeedleGain)));
                 const auto mirrored =
                     hn::Mul(hn::Mul(strength, bright), hn::Set(d, b.interface_scale[k]));
@@ -151,9 +154,18 @@ void needle_physical(PhysicalBlock& b, const NeedleRow& n, int row_begin, int ro
                                        hn::Mul(light, hn::Set(d, static_cast<float>(kNeedleTail) *
                                                                      b.gain[k]))));
                 shade = hn::Sub(shade, hn::Mul(seen, hn::Set(d, dim)));
+                lines = hn::IfThenZeroElse(hn::Gt(seen, zero), lines);
             }
+            // Sound runs to and fro between the shaft's walls: a line per diameter.
+            lines = hn::Add(lines, hn::Set(d, per_line));
+            const auto off = hn::Sub(hn::Add(lines, lines),
+                                     hn::Add(hn::Mul(hn::Floor(lines), hn::Set(d, 2.0f)), one));
+            const auto line =
+                hn::Mul(tail, hn::Add(hn::Set(d, static_cast<float>(kBetweenLines)),
+                                      hn::Mul(hn::Mul(off, off),
+                                              hn::Set(d, static_cast<float>(1 - kBetweenLines)))));
             hn::StoreU(hn::Mul(light, exp2_fading(d, shade)), d, b.light + at);
-            const auto power = hn::Mul(tail, tail);
+            const auto power = hn::Mul(line, line);
             hn::StoreU(k >= b.tail_from ? hn::Add(hn::LoadU(d, b.tail + at), power) : power, d,
                        b.tail + at);
         }

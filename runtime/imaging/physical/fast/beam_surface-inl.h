@@ -188,9 +188,11 @@ HWY_NOINLINE void surface_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
             press_surface(d, b, v, c.first + row, hn::Mul(nu, inverse), hn::Mul(nv, inverse),
                           hn::Mul(nz, inverse), cosine, distance);
         const auto c2 = hn::Mul(cosine, cosine), c4 = hn::Mul(c2, c2), c6 = hn::Mul(c4, c2);
-        const auto hard = hn::RebindMask(d, hn::TestBit(pair, hn::Set(di, kPairHard)));
+        const auto diffuse = hn::RebindMask(d, hn::TestBit(pair, hn::Set(di, kPairDiffuse)));
+        constexpr auto kPart = static_cast<float>(physical::kDiffusePart);
         const auto mirror = hn::IfThenElse(
-            hard, hn::Add(hn::Mul(hn::Set(d, 0.25f), cosine), hn::Mul(hn::Set(d, 0.75f), c6)),
+            diffuse,
+            hn::Add(hn::Mul(hn::Set(d, kPart), cosine), hn::Mul(hn::Set(d, 1 - kPart), c6)),
             hn::Add(hn::Mul(hn::Set(d, 0.08f), cosine),
                     hn::Mul(hn::Set(d, 0.92f), hn::Mul(c6, c4))));
         hn::Store(hn::IfThenElse(hn::RebindMask(d, near), mirror, hn::Set(d, 1.0f)), d,

@@ -46,7 +46,7 @@ std::int32_t pack_pair(const PairEcho& p, double sigma_mm) {
             std::lround(std::clamp(std::log2(p.amplitude) * 128 + 2048, 1.0, 4095.0)));
     word |= static_cast<std::int32_t>(std::lround(std::clamp(32 / sigma_mm, 1.0, 255.0))) << 12;
     word |= static_cast<std::int32_t>(std::lround(std::clamp(128 * p.split_mm, 0.0, 127.0))) << 24;
-    if (p.hard) word |= kPairHard;
+    if (p.diffuse) word |= kPairDiffuse;
     if (p.refracts) word |= kPairRefracts;
     if (p.pulse > 0) word |= kPairOwnPulse;
     if (p.pulse < 0) word |= kPairSecondPulse;

@@ -26,9 +26,9 @@ enum PackedKind : std::uint32_t {
 inline constexpr int kFineStructureBit = 1 << 19;
 
 // A pair's echo in one word: log2 of the amplitude (bits 0-11, 1/128, + 2048; 0: none), one over
-// the thickness (12-19, 1/32 per mm), hard (20), refracts (21), own label pulses (22), second label
-// pulses (23), split into two layers (24-30, 1/128 mm).
-inline constexpr int kPairHard = 1 << 20, kPairRefracts = 1 << 21, kPairOwnPulse = 1 << 22,
+// the thickness (12-19, 1/32 per mm), diffuse (20), refracts (21), own label pulses (22), second
+// label pulses (23), split into two layers (24-30, 1/128 mm).
+inline constexpr int kPairDiffuse = 1 << 20, kPairRefracts = 1 << 21, kPairOwnPulse = 1 << 22,
                      kPairSecondPulse = 1 << 23;
 
 // Rows of numbers per beam, `lines` apart.

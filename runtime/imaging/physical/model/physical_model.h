@@ -32,7 +32,9 @@ inline constexpr int kRoughEdge = 32;  // 128 kB: stays in the second-level cach
 inline constexpr double kRoughVoxelMm = 1.4;
 
 // Interfaces: amplitude 60 R^0.85, with the reflection coefficient R at most 0.115; specular and
-// diffuse parts by angle.
+// diffuse parts by angle. kDiffusePart: of surfaces that are bright at most angles; the slab sees
+// them at many tilts at once.
+inline constexpr double kDiffusePart = 0.5;
 inline constexpr double kInterfaceGain = 60;
 inline constexpr double kInterfacePower = 0.85;
 inline constexpr double kMaxReflection = 0.115;
@@ -89,12 +91,12 @@ inline constexpr int kMaxSpread = 8;  // beams to each side, from sample to samp
 inline constexpr int kMaxLateral = 12;  // taps to each side
 inline constexpr int kMaxAxial = 10;
 
-// Needle: a mirror of steel, its echo by the angle between beam and shaft.
+// Needle: a mirror of steel, its echo by the angle between beam and shaft, by the make
+// (formats/exercise/needle_makes.h).
 inline constexpr double kNeedleGain = 60;
-inline constexpr double kNeedleDiffuse = 0.035;
 inline constexpr double kNeedleShadowLog2 = 0.9;  // behind a needle that fills the slab
 inline constexpr double kNeedleTail = 0.09, kNeedleTailMm = 9;
-inline constexpr double kTipGlintMm = 1.0;
+inline constexpr double kBetweenLines = 0.35;  // of the tail, beside 1 at each line
 
 // Fine structure, below the size of a voxel: fibres of muscle, septa of fat. Periodic cubes of echo
 // offsets in quarter dB; a label's frame gives the cube's coordinates.

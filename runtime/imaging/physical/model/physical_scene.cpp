@@ -47,6 +47,7 @@ void line_vessel(const std::string& vessel, PairEcho& e) {
     if (contains(vessel, "portal") || is_artery(vessel)) {
         e.amplitude = kVesselWall;
         e.sigma_mm = kVesselWallMm;
+        e.diffuse = true;
     } else if (contains(vessel, "hepatic_vein") || contains(vessel, "cava")) {
         e.amplitude = 0;
     }
@@ -61,11 +62,11 @@ PairEcho pair_echo(const Label& la, const Tissue& a, const Label& lb, const Tiss
         return t.kind == TissueKind::bone || t.kind == TissueKind::gas;
     };
     const auto fluid = [](const Tissue& t) { return t.kind == TissueKind::fluid; };
-    e.hard = hard(a) || hard(b);
-    e.refracts = !e.hard && fluid(a) != fluid(b);
+    e.diffuse = hard(a) || hard(b);
+    e.refracts = !e.diffuse && fluid(a) != fluid(b);
     double reflection =
         std::abs(a.impedance_mrayl - b.impedance_mrayl) / (a.impedance_mrayl + b.impedance_mrayl);
-    e.sigma_mm = e.hard ? 0.20 : 0.16;
+    e.sigma_mm = e.diffuse ? 0.20 : 0.16;
     // Between muscles, and between muscle and fat, there is a sheet of connective tissue that the
     // label volume does not show.
     if (is_muscle(a) && is_muscle(b) && la.name != lb.name) {
@@ -78,7 +79,7 @@ PairEcho pair_echo(const Label& la, const Tissue& a, const Label& lb, const Tiss
         e.split_mm = 0.375;
     }
     // Cortical bone is the brightest arc of a picture.
-    constexpr double kMaxOfBone = 0.2;
+    constexpr double kMaxOfBone = 0.35;
     const bool bone = a.kind == TissueKind::bone || b.kind == TissueKind::bone;
     if (reflection > 1e-4) {
         const double most = bone ? kMaxOfBone : kMaxReflection;
@@ -93,8 +94,15 @@ void add_lining(const Label& la, const Tissue& a, const Label& lb, const Tissue&
     const bool fluid = a.kind == TissueKind::fluid || b.kind == TissueKind::fluid;
     if (is_parenchyma(a) && b.name == "blood") line_vessel(lb.name, e);
     if (is_parenchyma(b) && a.name == "blood") line_vessel(la.name, e);
+    // Mucosa, muscle and serosa of the gall bladder: a line all round.
+    if ((a.name == "bile") != (b.name == "bile") &&
+        (contains(la.name, "gall") || contains(lb.name, "gall")) && a.kind != b.kind) {
+        e.amplitude = std::max(e.amplitude, kVesselWall);
+        e.sigma_mm = kVesselWallMm;
+        e.diffuse = true;
+    }
     // An organ's capsule, and the peritoneum on it.
-    if (is_parenchyma(a) != is_parenchyma(b) && !e.hard && !fluid) {
+    if (is_parenchyma(a) != is_parenchyma(b) && !e.diffuse && !fluid) {
         e.split_mm = kCapsuleMm;
         e.amplitude = std::min(kCapsuleGain * e.amplitude, kMaxCapsule);
         // Between an organ and the wall lies the diaphragm, or a fascia.

@@ -29,7 +29,7 @@ struct PairEcho {
     double amplitude = 0;   // 60 R^0.85; 0: none
     double sigma_mm = 0.2;  // deviation of the reflecting layer
     double split_mm = 0;    // > 0: two layers, this far to either side of the surface
-    bool hard = false;      // bone or gas on one side
+    bool diffuse = false;   // bone, gas or a wall in fibrous tissue: bright at most angles
     bool refracts = false;  // fluid on one side
     int pulse = 0;          // +1: the first label swells with the pulse, -1: the second
 };

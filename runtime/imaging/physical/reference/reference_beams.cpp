@@ -20,6 +20,7 @@ struct BeamLight {
     double log2_light = 0;    // log2 of the light left after the tissue, there and back
     double needle_light = 0;  // log2 of the light left after the needle
     double bone = 0, bone_slow = 0, bone_floor = 0, gas = 0, needle_tail = 0;  // tails, amplitudes
+    double needle_lines = 0;                  // since the needle, diameters
     double lit = 0;                           // the last light well before a face of gas
     double reverb = 0, period = 0, next = 0;  // next line: amplitude, mm between lines, its depth
     double clutter = 0;                       // power
@@ -92,15 +93,19 @@ void meet_needle(const ReferenceInput& in, PlanePoint o, PlanePoint d, Sample& p
     const double seen = std::min(share * n.slab_mm / (2 * n.radius_mm), 1.0);
     if (!(seen > 0)) return;
     const double cosine = n.axis.x * d.x + n.axis.z * d.z;
-    const double mirror = std::pow(std::max(1 - cosine * cosine, 0.0), 6);
-    const double glint = 0.25 * std::max(1 - back / kTipGlintMm, 0.0);
-    const double i = kNeedleGain * seen * (kNeedleDiffuse + (1 - kNeedleDiffuse) * mirror + glint) *
-                     p.row.interface_scale;
+    const NeedleMake& make = *n.make;
+    const double mirror = std::exp2(-cosine * cosine / (make.lobe_sin * make.lobe_sin));
+    const double sine = std::sqrt(std::max(1 - cosine * cosine, 0.01));
+    const double faces = std::clamp(-(n.bevel.x * d.x + n.bevel.z * d.z) / sine, -1.0, 1.0);
+    const double tip = make.tip_away + (make.tip_towards - make.tip_away) * 0.5 * (1 + faces);
+    const double base = make.rough + (tip - make.rough) * needle_tip_part(back);
+    const double i = kNeedleGain * seen * (base + (1 - base) * mirror) * p.row.interface_scale;
+    t.needle_lines = 0;
     p.re += i;
     t.needle_light -=
         kNeedleShadowLog2 * seen * std::min(in.geometry.step_mm / (2 * n.radius_mm), 1.0);
     t.needle_tail = std::max(t.needle_tail, kNeedleTail * kNeedleGain * seen *
-                                                (kNeedleDiffuse + mirror) * p.here * p.row.gain);
+                                                (make.rough + mirror) * p.here * p.row.gain);
 }
 
 // Power of the tails at a depth; moves on to the next line of the reverberation.
@@ -117,7 +122,11 @@ double tail_power(const ReferenceInput& in, const Row& row, BeamLight& t) {
             t.reverb *= kReverbLoss;
         }
     }
-    return power + t.needle_tail * t.needle_tail;
+    if (in.frame.needle == nullptr) return power;
+    t.needle_lines += in.geometry.step_mm / (2 * in.frame.needle->radius_mm);
+    const double off = 2 * (t.needle_lines - std::floor(t.needle_lines)) - 1;
+    const double line = t.needle_tail * (kBetweenLines + (1 - kBetweenLines) * off * off);
+    return power + line * line;
 }
 
 // One frame's beams.

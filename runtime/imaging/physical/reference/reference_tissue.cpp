@@ -226,8 +226,8 @@ void meet_surface(const ReferenceInput& in, Vector3 beam, Sample& p) {
     if (place.second < 0) return;
     const PairEcho& pair = in.scene.pairs[place.own * in.scene.labels() + place.second];
     const double cosine = std::abs(dot(place.normal, beam));
-    p.facing = pair.hard ? 0.25 * cosine + 0.75 * std::pow(cosine, 6)
-                         : 0.08 * cosine + 0.92 * std::pow(cosine, 10);
+    p.facing = pair.diffuse ? kDiffusePart * cosine + (1 - kDiffusePart) * std::pow(cosine, 6)
+                            : 0.08 * cosine + 0.92 * std::pow(cosine, 10);
     if (in.frame.effects.interfaces && pair.amplitude > 0) {
         const double u =
             (std::abs(place.distance_mm) - pair.split_mm) / blurred_mm(in.tables, pair.sigma_mm);

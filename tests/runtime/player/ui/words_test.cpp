@@ -10,6 +10,7 @@
 
 #include "formats/base/result.h"
 #include "formats/exercise/metric_table.h"
+#include "formats/exercise/needle_makes.h"
 #include "runtime/player/app/attempt_result.h"
 #include "runtime/player/app/case_steps.h"
 #include "runtime/player/app/guided_start.h"
@@ -155,6 +156,8 @@ TEST_F(Words, MeasuresAdviceGuideHelpAndPresetsAreInTheCatalogue) {
         EXPECT_TRUE(has(guide_words(static_cast<GuideStep>(i))));
     }
     for (const Shortcut& s : shortcuts()) EXPECT_TRUE(has(s.does)) << s.does;
+    for (const NeedleMake& make : needle_makes())
+        EXPECT_TRUE(!make.echogenic || has(make.about)) << make.about;
     for (const ImagePreset& preset : kPresets) {
         EXPECT_TRUE(has(preset.name));
         EXPECT_TRUE(has(preset.tip));
