@@ -171,8 +171,14 @@ std::unique_ptr<DopplerView> aimed_view(Notices& notices,
     std::unique_ptr<DopplerView> view;
     loaded.scan->with_engine([&](ScanEngine& engine) {
         view = make_doppler(notices, *loaded.open, doppler.mode, engine);
-        if (view && engine.last().tools.has_probe)
+        if (!view) return;
+        if (engine.last().tools.has_probe) {
             aimed = view->aim(engine.last().input, doppler, true, &engine.renderer());
+        } else {  // an engine without a frame yet: at rest, where the frame shown has the probe
+            FrameInput input;
+            input.mannequin_from_probe = loaded.frame().record.tools.mannequin_from_probe;
+            aimed = view->aim(input, doppler, true);
+        }
     });
     return view;
 }
