@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "formats/base/constants.h"
+#include "formats/exercise/exercise_texts.h"
 #include "formats/exercise/metric_table.h"
 #include "formats/pathology/pathology_kinds.h"
 #include "formats/text/nearest_name.h"
@@ -200,6 +201,32 @@ std::string flowed(const std::string& lines) {
     return text;
 }
 
+// hints: how many the exercise has; negative: not checked here.
+std::vector<ExerciseTexts> read_texts(const TomlTable& table, int hints) {
+    std::vector<ExerciseTexts> all;
+    for (const std::string& language : table.keys()) {
+        const auto own = table.table(language);
+        if (language.size() != 2)
+            table.add_fault(language, "is no language",
+                            "expected a code of two letters, as in [texts.de]");
+        if (!own || language.size() != 2) continue;
+        ExerciseTexts texts;
+        texts.language = language;
+        own->text("title", texts.title);
+        own->text("description", texts.description);
+        texts.description = flowed(texts.description);
+        own->texts("hints", texts.hints, true);
+        if (hints >= 0 && !texts.hints.empty() && static_cast<int>(texts.hints.size()) != hints)
+            own->add_fault(
+                "hints", "has " + std::to_string(texts.hints.size()) + " texts",
+                "expected " + std::to_string(hints) + ", one for each of the exercise's hints");
+        own->finish();
+        all.push_back(std::move(texts));
+    }
+    table.finish();
+    return all;
+}
+
 Exercise read_exercise(const TomlTable& root) {
     Exercise e;
     root.text("name", e.name);
@@ -215,6 +242,7 @@ Exercise read_exercise(const TomlTable& root) {
     if (const auto mode = root.choice("mode", mode_names()))
         e.mode = static_cast<ExerciseMode>(*mode);
     root.texts("hints", e.hints, true);
+    if (auto table = root.table("texts")) read_texts(*table, static_cast<int>(e.hints.size()));
     root.whole("mastery", e.mastery, 1, 100);
     root.text("model", e.model, {"physical", "paper"});
     root.texts("effects", e.effects, true);
@@ -258,6 +286,30 @@ Result<Exercise> parse_exercise(std::string_view text, const std::string& where)
     Exercise exercise = read_exercise(root);
     if (root.fault()) return *root.fault();
     return exercise;
+}
+
+Result<std::vector<ExerciseTexts>> parse_exercise_texts(std::string_view toml,
+                                                        const std::string& where) {
+    SONOCASE_TRY(const auto root, TomlTable::parse(toml, where));
+    std::vector<ExerciseTexts> texts;
+    if (auto table = root.table("texts")) texts = read_texts(*table, -1);
+    if (root.fault()) return *root.fault();
+    return texts;
+}
+
+ExerciseTexts texts_in(const Exercise& exercise,
+                       const std::vector<ExerciseTexts>& texts,
+                       std::string_view language) {
+    ExerciseTexts out{std::string(language),
+                      exercise.title.empty() ? exercise.name : exercise.title, exercise.description,
+                      exercise.hints};
+    for (const ExerciseTexts& own : texts) {
+        if (own.language != language) continue;
+        if (!own.title.empty()) out.title = own.title;
+        if (!own.description.empty()) out.description = own.description;
+        if (own.hints.size() == exercise.hints.size()) out.hints = own.hints;
+    }
+    return out;
 }
 
 std::vector<Target> shown_lesions(const Exercise& exercise) {

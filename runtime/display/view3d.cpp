@@ -30,6 +30,7 @@ struct View3d::Impl {
     Box3 box;         // around the skin
     Point3 interest;  // the point that the view from outside turns about
     Matrix3 home;     // columns: right, up, towards the eye
+    BodyAxes axes;    // of the case
     Renderer::Layout plane_layout;
     bool plane_flipped = false;
     Rigid view_from_mannequin;
@@ -99,6 +100,7 @@ void View3d::set_case(const CaseBundle& bundle) {
     const Model skin = model_of(mesh);
     d.box = {};
     for (const Point3 p : mesh.points) d.box.include(p);
+    d.axes = body_axes(bundle);
     d.skin.upload(skin);
     if (d.box.empty()) d.box = bundle.grid.bounds();
 }
@@ -106,10 +108,10 @@ void View3d::set_case(const CaseBundle& bundle) {
 void View3d::set_exercise(const Exercise& exercise) {
     Impl& d = *impl_;
     d.exercise = exercise;
-    const HomeView view = home_view(d.box, exercise);
+    const HomeView view = home_view(d.box, exercise, d.axes);
     d.home = view.home;
     d.interest = view.interest;
-    first_.distance_mm = view.orbit.distance_mm;
+    first_ = view.orbit;
     orbit_ = first_;
     d.probe.upload(probe_model(exercise.probe));
     d.mark.upload(mark_model(exercise.probe));
@@ -262,6 +264,17 @@ void* View3d::draw_for_other(int width_px, int height_px, const View3dInput& inp
     d.view_from_mannequin = view;
     d.tan_half = tan_half;
     return d.other.texture();
+}
+
+std::vector<CubeFace> View3d::cube() const {
+    const Impl& d = *impl_;
+    return d.axes.known ? cube_faces(d.view_from_mannequin.rotation, d.axes)
+                        : std::vector<CubeFace>{};
+}
+
+void View3d::look_at(Vector3 outward) {
+    from_ = ViewFrom::outside;
+    orbit_ = orbit_towards(impl_->home, outward, orbit_.distance_mm);
 }
 
 ViewRay View3d::ray(double x_px, double y_px) const {

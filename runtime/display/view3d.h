@@ -56,6 +56,11 @@ class View3d {
     void set_exercise(const Exercise& exercise);
     Orbit& orbit() { return orbit_; }
     void home() { orbit_ = first_; }
+    // The orientation cube as it is seen in the last drawing of draw(); empty: the case's labels do
+    // not say how the patient lies.
+    std::vector<CubeFace> cube() const;
+    // From outside, with that direction of the frame `mannequin` towards the eye.
+    void look_at(Vector3 outward);
     // The viewpoint; the view is from outside while the tool is missing.
     ViewFrom& from() { return from_; }
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/base/clinical_names.h"
 #include "formats/base/digest.h"
 #include "formats/recording/session.h"
 #include "formats/text/number_text.h"
@@ -179,9 +180,8 @@ std::string event_words(const LiveEvent& event,
     };
     const auto label = [&] {
         const auto i = static_cast<std::size_t>(event.index);
-        std::string name = event.index >= 0 && i < labels.size() ? labels[i].name : "a structure";
-        std::replace(name.begin(), name.end(), '_', ' ');
-        return name;
+        return event.index >= 0 && i < labels.size() ? clinical_name(labels[i].name)
+                                                     : std::string("a structure");
     };
     char number[32];
     std::snprintf(number, sizeof number, "%.0f mm", event.value);

@@ -137,5 +137,22 @@ TEST(HonestExercises, OfTheRealTorso) {
                   1000, 20);
 }
 
+// Exercises of the other scenarios whose script has a needle from the start; those that press or
+// look in colour first are played by pressing_exercises_test.cpp and doppler_runs_test.cpp.
+TEST(HonestExercises, ScriptsOfTheGalleryPassTheirMarks) {
+    const testing::TemporaryFolder folder;
+    expect_scripts_pass(Case(
+        cooked(folder, std::string(SONOCASE_SOURCE) + "/scenarios/lesion-gallery --preset draft")));
+}
+
+TEST(HonestExercises, ScriptsOfTheWomanPassTheirMarks) {
+    const std::string data = SONOCASE_DATA;
+    if (!fs::exists(data + "/organ_meshes")) GTEST_SKIP() << "no " << data;
+    const testing::TemporaryFolder folder;
+    expect_scripts_pass(Case(cooked(folder, std::string(SONOCASE_SOURCE) +
+                                                "/scenarios/atlas-woman/case.toml --data " + data +
+                                                " --set resample.voxel_mm=2")));
+}
+
 }  // namespace
 }  // namespace sonocase

@@ -16,7 +16,21 @@ Rigid looking(Point3 eye, Point3 at, Vector3 up_hint) {
 
 }  // namespace
 
-HomeView home_view(const Box3& body, const Exercise& exercise) {
+HomeView home_view(const Box3& body, const Exercise& exercise, const BodyAxes& axes) {
+    if (axes.known) {
+        HomeView out;
+        // As the patient is faced: the right side is on the left.
+        out.home = Matrix3::from_columns(-axes.right, axes.head, axes.front);
+        out.interest = body.centre() + 0.15 * (exercise.start_probe - body.centre());
+        const Vector3 extent = body.extent();
+        const double reach = 1.35 * std::max({extent.x, extent.y, extent.z, 100.0});
+        out.orbit = orbit_towards(out.home, -exercise.start_beam, reach);
+        // Beside the probe rather than along it, and a little from above.
+        constexpr double kBesideRad = 0.45, kAboveRad = 0.22;
+        out.orbit.yaw_rad += out.orbit.yaw_rad > 0 ? -kBesideRad : kBesideRad;
+        out.orbit.pitch_rad = kAboveRad;
+        return out;
+    }
     // The probe looks down in the picture, whatever the mannequin's axes are called; the body's
     // long axis runs across, as when a patient lies in front of an operator.
     const Vector3 up = normalized(-exercise.start_beam);
@@ -31,6 +45,47 @@ HomeView home_view(const Box3& body, const Exercise& exercise) {
     out.interest = body.centre() + 0.3 * (exercise.start_probe - body.centre());
     out.orbit.distance_mm = 1.55 * std::max({extent.x, extent.y, extent.z, 100.0});
     return out;
+}
+
+std::vector<CubeFace> cube_faces(const Matrix3& camera_from_mannequin, const BodyAxes& axes) {
+    struct Side {
+        const char* letter;
+        Vector3 outward, across, along;
+    };
+    const Side sides[] = {
+        {"R", axes.right, axes.front, axes.head}, {"L", -axes.right, axes.front, axes.head},
+        {"A", axes.front, axes.right, axes.head}, {"P", -axes.front, axes.right, axes.head},
+        {"H", axes.head, axes.right, axes.front}, {"F", -axes.head, axes.right, axes.front}};
+    constexpr double kHalf = 0.57;  // so that a corner, at sqrt(3) of it, is within 1
+    constexpr double kInSight = 0.02;
+    std::vector<CubeFace> faces;
+    for (const Side& side : sides) {
+        const double towards = (camera_from_mannequin * side.outward).z;
+        if (towards < kInSight) continue;
+        CubeFace face{side.letter, {}, towards, side.outward};
+        constexpr double kSigns[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+        for (int i = 0; i < 4; ++i) {
+            const Vector3 p =
+                camera_from_mannequin *
+                (kHalf * (side.outward + kSigns[i][0] * side.across + kSigns[i][1] * side.along));
+            face.corners[static_cast<std::size_t>(i)] = {p.x, p.y};
+        }
+        faces.push_back(face);
+    }
+    std::sort(faces.begin(), faces.end(),
+              [](const CubeFace& a, const CubeFace& b) { return a.towards_eye < b.towards_eye; });
+    return faces;
+}
+
+Orbit orbit_towards(const Matrix3& home, Vector3 outward, double distance_mm) {
+    constexpr double kMaxPitchRad = 1.5;  // upright has no direction straight from above
+    const double x = dot(home.column(0), outward), y = dot(home.column(1), outward),
+                 z = dot(home.column(2), outward);
+    Orbit orbit;
+    orbit.yaw_rad = std::hypot(x, z) > 1e-3 ? std::atan2(x, z) : 0;
+    orbit.pitch_rad = std::clamp(std::atan2(y, std::hypot(x, z)), -kMaxPitchRad, kMaxPitchRad);
+    orbit.distance_mm = distance_mm;
+    return orbit;
 }
 
 Rigid mannequin_from_outside_camera(const Matrix3& home, Point3 interest, const Orbit& orbit) {

@@ -4,7 +4,11 @@
 // x to the right, y up and z towards the eye.
 #pragma once
 
+#include <array>
+#include <vector>
+
 #include "formats/base/geometry.h"
+#include "formats/bundle/body_axes.h"
 #include "formats/exercise/exercise.h"
 
 namespace sonocase::runtime::inline display_models {
@@ -23,8 +27,21 @@ struct HomeView {
     Point3 interest;  // the point that it turns about
     Orbit orbit;
 };
-// body: box around the skin. The probe points down, the long axis of the body runs across.
-HomeView home_view(const Box3& body, const Exercise& exercise);
+// body: box around the skin. The patient stands upright and is seen from the side of the probe;
+// where the axes are not known, the probe points down and the long axis of the body runs across.
+HomeView home_view(const Box3& body, const Exercise& exercise, const BodyAxes& axes = {});
+
+// A face of the orientation cube that is in sight.
+struct CubeFace {
+    const char* letter;  // R, L, A, P, H or F: the side of the patient that it is on
+    std::array<std::array<double, 2>, 4> corners;  // x to the right, y up; the cube is in [-1, 1]
+    double towards_eye;                            // (0, 1]
+    Vector3 outward;                               // frame `mannequin`
+};
+// The faces in sight, the farthest first. camera_from_mannequin: its rotation.
+std::vector<CubeFace> cube_faces(const Matrix3& camera_from_mannequin, const BodyAxes& axes);
+// The orbit from which a direction of the frame `mannequin` points to the eye.
+Orbit orbit_towards(const Matrix3& home, Vector3 outward, double distance_mm);
 
 // home: columns right, up and towards the eye, where yaw and pitch are 0.
 Rigid mannequin_from_outside_camera(const Matrix3& home, Point3 interest, const Orbit& orbit);

@@ -278,28 +278,104 @@ DopplerReport DopplerView::report() const {
     return out;
 }
 
-DopplerSettings DopplerView::aimed(const FrameInput& input,
-                                   DopplerSettings settings,
-                                   bool steers) const {
-    const Impl& m = *impl_;
+namespace {
+
+// Where a vessel's centre line is in the picture: its place in the plane, and how far beside it.
+struct SeenNode {
+    PlanePoint at;
+    double off_mm = 0;
+    double radius_mm = 0;
+    Vector3 flow;  // unit, frame `probe`
+};
+
+SeenNode seen_node(const FlowNode& node,
+                   const Rigid& probe_from_mannequin,
+                   const TissuePlace* tissue) {
+    const Point3 p = probe_from_mannequin * node.centre;
+    SeenNode seen{{p.x, p.z},
+                  p.y,
+                  std::sqrt(section_area_mm2(node.radius_mm) / kPi),
+                  probe_from_mannequin * node.direction};
+    if (!tissue) return seen;
+    // What the picture shows at a place lies elsewhere at rest; the difference changes little over
+    // some millimetres, so that a few steps find the place that shows the node.
+    constexpr int kSteps = 4;
+    for (int i = 0; i < kSteps; ++i) {
+        const Point3 there = probe_from_mannequin * tissue->rest(seen.at);
+        seen.at.x += p.x - there.x;
+        seen.at.z += p.z - there.z;
+        seen.off_mm = p.y - there.y;
+    }
+    return seen;
+}
+
+SeenNode between(const SeenNode& a, const SeenNode& b, double t) {
+    const auto mix = [t](double u, double v) { return u + t * (v - u); };
+    return {{mix(a.at.x, b.at.x), mix(a.at.z, b.at.z)},
+            mix(a.off_mm, b.off_mm),
+            mix(a.radius_mm, b.radius_mm),
+            normalized(a.flow + t * (b.flow - a.flow))};
+}
+
+}  // namespace
+
+std::optional<DopplerSettings> DopplerView::aim(const FrameInput& input,
+                                                DopplerSettings settings,
+                                                bool steers,
+                                                const Renderer* shown) const {
+    Impl& m = *impl_;
     const Rigid probe_from_mannequin = inverse(input.mannequin_from_probe);
-    const FlowNode* widest = nullptr;
-    double radius = 0;
-    for (const FlowVessel& vessel : m.bundle->flow.vessels)
+    const TissuePlace* tissue = nullptr;
+    if (shown) {
+        m.tissue.begin(input, *shown);
+        tissue = &m.tissue;
+    }
+    // Bone or gas on the way from the face hides a vessel.
+    const auto hidden = [&](PlanePoint at) {
+        if (!tissue) return false;
+        constexpr int kSteps = 60;
+        const double apex = m.geometry.fan ? -m.geometry.radius_mm : at.z;
+        const double from_x = m.geometry.fan ? 0 : at.x;
+        const double reach = std::hypot(at.x - from_x, at.z - (m.geometry.fan ? apex : 0));
+        for (int i = 1; i < kSteps; ++i) {
+            const double t = double(i) / kSteps;
+            if (m.geometry.fan && t * reach < m.geometry.radius_mm) continue;  // before the face
+            const PlanePoint p = m.geometry.fan ? PlanePoint{t * at.x, apex + t * (at.z - apex)}
+                                                : PlanePoint{at.x, t * at.z};
+            if (tissue->blocks(p)) return true;
+        }
+        return false;
+    };
+    std::optional<SeenNode> widest;
+    const auto consider = [&](const SeenNode& node) {
+        double line = 0, sample = 0;
+        if ((widest && node.radius_mm <= widest->radius_mm) ||
+            !m.geometry.locate(node.at, line, sample) || hidden(node.at) ||
+            (tissue && tissue->closed(tissue->rest(node.at))))
+            return;
+        widest = node;
+    };
+    constexpr double kFarMm = 40;  // beyond all breathing and pressing
+    for (const FlowVessel& vessel : m.bundle->flow.vessels) {
+        std::optional<SeenNode> before;
         for (int i = 0; i < vessel.nodes; ++i) {
             const FlowNode& node = m.bundle->flow.nodes[vessel.first_node + i];
-            const Point3 p = probe_from_mannequin * node.centre;
-            const double here = std::sqrt(section_area_mm2(node.radius_mm) / kPi);
-            double line = 0, sample = 0;
-            if (std::abs(p.y) > kInPlaneMm || here <= radius ||
-                !m.geometry.locate({p.x, p.z}, line, sample))
+            if (std::abs((probe_from_mannequin * node.centre).y) > kFarMm) {
+                before.reset();
                 continue;
-            widest = &node;
-            radius = here;
+            }
+            const SeenNode now = seen_node(node, probe_from_mannequin, tissue);
+            // Along the plane, or across it between two nodes.
+            if (std::abs(now.off_mm) < std::min(kInPlaneMm, 0.5 * now.radius_mm)) consider(now);
+            if (before && (before->off_mm < 0) != (now.off_mm < 0))
+                consider(between(*before, now, before->off_mm / (before->off_mm - now.off_mm)));
+            before = now;
         }
-    if (widest == nullptr) return settings;
-    const Point3 p = probe_from_mannequin * widest->centre;
-    const Vector3 flow = probe_from_mannequin * widest->direction;
+    }
+    if (!widest) return std::nullopt;
+    const PlanePoint p = widest->at;
+    const Vector3 flow = widest->flow;
+    const double radius = widest->radius_mm;
     const auto cosine = [&](double steer_deg) {
         DopplerSettings tried = settings;
         tried.steer_deg = steer_deg;

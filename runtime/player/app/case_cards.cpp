@@ -15,9 +15,11 @@
 #include <sstream>
 #include <thread>
 
+#include "formats/text/toml_reader.h"
 #include "runtime/engine/scan_engine.h"
 #include "runtime/player/app/settings.h"
 #include "runtime/player/session/open_case.h"
+#include "runtime/player/words/words.h"
 #include "runtime/tracking/mouse_tracker.h"
 
 namespace sonocase::runtime::inline player_app {
@@ -113,6 +115,14 @@ std::string state_of(const std::string& path) {
     return state;
 }
 
+// The title that the recipe gives the case; its name where it gives none.
+std::string case_title(const CaseManifest& manifest) {
+    std::string title;
+    if (const auto recipe = TomlTable::parse(manifest.recipe, manifest.case_name))
+        recipe->text("title", title);
+    return title.empty() ? manifest.case_name : title;
+}
+
 void draw_picture(const OpenCase& open, CaseCard& card) {
     const Exercise& exercise = open.exercises.front();
     PlayerArguments arguments;
@@ -136,6 +146,12 @@ void draw_picture(const OpenCase& open, CaseCard& card) {
 
 }  // namespace
 
+const std::string& title_of(const CaseCard::Exercise& exercise) {
+    for (std::size_t i = 0; i < std::min(exercise.titles.size(), languages().size()); ++i)
+        if (&languages()[i] == &language_in_use()) return exercise.titles[i];
+    return exercise.titles.empty() ? exercise.name : exercise.titles[0];
+}
+
 CaseCard make_case_card(const std::string& path) {
     CaseCard card;
     card.path = path;
@@ -145,10 +161,15 @@ CaseCard make_case_card(const std::string& path) {
         return card;
     }
     card.case_name = (*open)->bundle->manifest.case_name;
-    for (const Exercise& exercise : (*open)->exercises)
-        card.exercises.push_back({exercise.name,
-                                  exercise.title.empty() ? exercise.name : exercise.title,
-                                  exercise.mastery, exercise.difficulty});
+    card.title = case_title((*open)->bundle->manifest);
+    for (std::size_t i = 0; i < (*open)->exercises.size(); ++i) {
+        const Exercise& exercise = (*open)->exercises[i];
+        std::vector<std::string> titles;
+        for (const Language& language : languages())
+            titles.push_back(texts_of(**open, static_cast<int>(i), language.code).title);
+        card.exercises.push_back(
+            {exercise.name, std::move(titles), exercise.mastery, exercise.difficulty});
+    }
     draw_picture(**open, card);
     return card;
 }

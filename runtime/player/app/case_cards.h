@@ -33,12 +33,14 @@ void remember_bundle(const std::string& path, std::vector<std::string>& recent);
 
 struct CaseCard {
     struct Exercise {
-        std::string name, title;
+        std::string name;
+        std::vector<std::string> titles;  // # languages(), in the window's languages
         int mastery = 3;
         int difficulty = 1;
     };
     std::string path;
     std::string case_name;
+    std::string title;  // of the recipe; the name where it has none
     std::vector<Exercise> exercises;
     Message fault;  // why it cannot be opened, a sentence; empty: it can
     // The picture at the start of the first exercise, grey, rows from the top; empty: none.
@@ -63,6 +65,9 @@ class CaseCards {
     struct Impl;
     std::unique_ptr<Impl> impl_;
 };
+
+// In the language in use.
+const std::string& title_of(const CaseCard::Exercise& exercise);
 
 // Opens a case and makes its card. Cost: opening it, and one picture.
 CaseCard make_case_card(const std::string& path);

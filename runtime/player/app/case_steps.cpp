@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <optional>
 
 #include "formats/bundle/case_bundle.h"
 #include "formats/files/load_save.h"
@@ -13,6 +14,7 @@
 #include "runtime/player/app/tracker_steps.h"
 #include "runtime/player/session/calibration_set.h"
 #include "runtime/player/session/clock.h"
+#include "runtime/player/words/words.h"
 
 namespace sonocase::runtime::inline player_app {
 
@@ -23,6 +25,10 @@ std::vector<Point3> CaseState::target_centres() const {
         centres.push_back(engine.anatomy ? engine.anatomy->moved(target.centre, time_s)
                                          : target.centre);
     return centres;
+}
+
+ExerciseTexts CaseState::texts() const {
+    return texts_of(*open, exercise_index, language_in_use().code);
 }
 
 namespace {
@@ -154,45 +160,69 @@ void choose_model(PlayerState& player,
     rebuild_engine(player, loaded, console);
 }
 
+namespace {
+
+// A view of the mode in use, and where it would aim in the frame shown. Null, with a notice: there
+// is none.
+std::unique_ptr<DopplerView> aimed_view(Notices& notices,
+                                        const CaseState& loaded,
+                                        const DopplerSettings& doppler,
+                                        std::optional<DopplerSettings>& aimed) {
+    std::unique_ptr<DopplerView> view;
+    loaded.scan->with_engine([&](ScanEngine& engine) {
+        view = make_doppler(notices, *loaded.open, doppler.mode, engine);
+        if (!view) return;
+        if (engine.last().tools.has_probe) {
+            aimed = view->aim(engine.last().input, doppler, true, &engine.renderer());
+        } else {  // an engine without a frame yet: at rest, where the frame shown has the probe
+            FrameInput input;
+            input.mannequin_from_probe = loaded.frame().record.tools.mannequin_from_probe;
+            aimed = view->aim(input, doppler, true);
+        }
+    });
+    return view;
+}
+
+}  // namespace
+
 void choose_mode(Notices& notices, CaseState& loaded, Console& console, DopplerMode mode) {
     DopplerSettings& doppler = console.controls.settings.doppler;
     if (!loaded.open || mode == doppler.mode) return;
     const bool first = doppler.mode == DopplerMode::off;
     doppler.mode = mode;
     if (mode == DopplerMode::off || !first) return;
-    std::unique_ptr<DopplerView> view;
-    loaded.scan->with_engine([&](ScanEngine& engine) {
-        view = make_doppler(notices, *loaded.open, doppler.mode, engine);
-    });
-    if (!view) {
+    std::optional<DopplerSettings> aimed;
+    std::unique_ptr<DopplerView> made = aimed_view(notices, loaded, doppler, aimed);
+    if (!made) {
         doppler.mode = DopplerMode::off;
         return;
     }
-    if (!view->has_flow() && mode != DopplerMode::m_mode)
+    if (!made->has_flow() && mode != DopplerMode::m_mode)
         notices.warning(
             "This case says nothing about the flow of blood, so that Doppler modes show none.");
     if (!console.doppler_aimed) {
-        FrameInput input;
-        input.mannequin_from_probe = loaded.frame().record.tools.mannequin_from_probe;
-        doppler = view->aimed(input, doppler);
+        doppler = aimed.value_or(doppler);
         console.doppler_aimed = true;
     }
-    loaded.scan->set_doppler(std::move(view));
+    loaded.scan->set_doppler(std::move(made));
 }
 
 void aim_doppler(Notices& notices, CaseState& loaded, Console& console) {
     DopplerSettings& doppler = console.controls.settings.doppler;
     if (!loaded.open || doppler.mode == DopplerMode::off) return;
-    std::unique_ptr<DopplerView> view;
-    loaded.scan->with_engine([&](ScanEngine& engine) {
-        view = make_doppler(notices, *loaded.open, doppler.mode, engine);
-    });
-    if (!view) return;
-    FrameInput input;
-    input.mannequin_from_probe = loaded.frame().record.tools.mannequin_from_probe;
-    const DopplerSettings aimed = view->aimed(input, doppler);
-    if (aimed == doppler) notices.news("The picture's plane cuts no vessel.");
-    doppler = aimed;
+    constexpr double kMaxAngleDeg = 60;  // beyond it an error of the cursor counts too much
+    std::optional<DopplerSettings> aimed;
+    if (!aimed_view(notices, loaded, doppler, aimed)) return;
+    if (!aimed) {
+        notices.warning("The picture's plane cuts no open vessel here: slide or tilt the probe.");
+        return;
+    }
+    doppler = *aimed;
+    if (doppler.mode == DopplerMode::spectral && std::abs(doppler.angle_deg) > kMaxAngleDeg)
+        notices.warning(
+            {"The vessel lies {} degrees to the beam: turn or rock the probe until it is at most "
+             "60, or the speed is not to be trusted.",
+             {std::to_string(std::lround(std::abs(doppler.angle_deg)))}});
 }
 
 void change_depth(PlayerState& player, CaseState& loaded, Console& console, double by_mm) {

@@ -92,12 +92,14 @@ ContrastingGroups contrasting_groups(std::span<const double> experts,
 }
 
 ExerciseReliability exercise_reliability(std::span<const ProgressEntry> entries,
-                                         const std::string& exercise,
+                                         const ClassExercise& exercise,
                                          const std::set<std::string>& experts) {
     std::map<std::string, std::vector<double>> results;
     for (const ProgressEntry& entry : entries) {
         const double mm = tip_to_target(entry);
-        if (entry.exercise == exercise && std::isfinite(mm)) results[entry.trainee].push_back(mm);
+        if (entry.exercise == exercise.name && entry.case_name == exercise.case_name &&
+            std::isfinite(mm))
+            results[entry.trainee].push_back(mm);
     }
     ExerciseReliability found;
     std::vector<std::vector<double>> rows;
@@ -123,43 +125,45 @@ constexpr int kManyAttempts = 3;  // without a pass: help is due
 
 }  // namespace
 
-Standing ClassRecords::standing(const std::string& trainee, const std::string& exercise) const {
+Standing ClassRecords::standing(const std::string& trainee, const ClassExercise& exercise) const {
     std::vector<ProgressEntry> own;
+    for (const ProgressEntry& entry : entries)
+        if (entry.trainee == trainee) own.push_back(entry);
+    return runtime::standing(own, exercise.case_name, exercise.name, kMastery);
+}
+
+std::vector<double> ClassRecords::curve(const std::string& trainee,
+                                        const ClassExercise& exercise) const {
+    std::vector<double> all;
     for (const ProgressEntry& entry : entries) {
-        if (entry.trainee != trainee || entry.exercise != exercise) continue;
-        own.push_back(entry);
-        own.back().case_name.clear();  // the exercise counts, on whichever case
+        const double mm = tip_to_target(entry);
+        if (entry.trainee == trainee && entry.exercise == exercise.name &&
+            entry.case_name == exercise.case_name && std::isfinite(mm))
+            all.push_back(mm);
     }
-    return runtime::standing(own, "", exercise, kMastery);
+    return all;
 }
 
 ClassRecords make_class_records(std::vector<ProgressEntry> entries,
                                 const std::set<std::string>& experts) {
     ClassRecords records;
     records.entries = std::move(entries);
-    std::set<std::string> trainees, exercises;
+    std::set<std::string> trainees;
+    std::set<ClassExercise> exercises;
     for (const ProgressEntry& entry : records.entries) {
         trainees.insert(entry.trainee);
-        exercises.insert(entry.exercise);
-        for (const Metric& metric : entry.metrics) {
-            if (metric.name == "final_tip_to_target_mm" && std::isfinite(metric.value))
-                records.curves[entry.trainee].push_back(metric.value);
-        }
+        exercises.insert({entry.case_name, entry.exercise});
     }
     records.trainees.assign(trainees.begin(), trainees.end());
     records.exercises.assign(exercises.begin(), exercises.end());
-    for (const std::string& exercise : records.exercises)
+    for (const ClassExercise& exercise : records.exercises)
         records.reliability[exercise] = exercise_reliability(records.entries, exercise, experts);
     for (const std::string& trainee : records.trainees) {
-        for (const std::string& exercise : records.exercises) {
+        for (const ClassExercise& exercise : records.exercises) {
             const Standing now = records.standing(trainee, exercise);
-            if (now.attempts < kManyAttempts || now.passes > 0 || !records.sentence.empty())
+            if (now.attempts < kManyAttempts || now.passes > 0 || !records.help.trainee.empty())
                 continue;
-            char words[256];
-            std::snprintf(words, sizeof words,
-                          tr("%s may need help with %s: %d attempts, no pass."), trainee.c_str(),
-                          exercise.c_str(), now.attempts);
-            records.sentence = words;
+            records.help = {trainee, exercise, now.attempts};
         }
     }
     return records;

@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cmath>
+#include <compare>
 #include <map>
 #include <set>
 #include <span>
@@ -39,6 +40,13 @@ struct ContrastingGroups {
 ContrastingGroups contrasting_groups(std::span<const double> experts,
                                      std::span<const double> novices);
 
+// The same exercise on two cases is two.
+struct ClassExercise {
+    std::string case_name, name;
+
+    friend auto operator<=>(const ClassExercise&, const ClassExercise&) = default;
+};
+
 struct ExerciseReliability {
     double alpha = NAN;
     int trainees = 0;  // that alpha rests on
@@ -46,21 +54,29 @@ struct ExerciseReliability {
 };
 // The reliability of final_tip_to_target_mm. entries: oldest first.
 ExerciseReliability exercise_reliability(std::span<const ProgressEntry> entries,
-                                         const std::string& exercise,
+                                         const ClassExercise& exercise,
                                          const std::set<std::string>& experts);
 
 // What an educator sees: every trainee's standing with every exercise, from the progress book of
 // this machine.
 
-struct ClassRecords {
-    std::vector<ProgressEntry> entries;            // oldest first
-    std::vector<std::string> trainees, exercises;  // those that occur, sorted
-    std::map<std::string, std::vector<double>>
-        curves;  // by trainee: tip to target, mm, of each attempt
-    std::map<std::string, ExerciseReliability> reliability;  // by exercise
-    std::string sentence;  // who needs help, in the language in use; empty: nobody
+// Who needs help: the first with several attempts and no pass.
+struct NeedsHelp {
+    std::string trainee;  // empty: nobody
+    ClassExercise exercise;
+    int attempts = 0;
+};
 
-    Standing standing(const std::string& trainee, const std::string& exercise) const;
+struct ClassRecords {
+    std::vector<ProgressEntry> entries;    // oldest first
+    std::vector<std::string> trainees;     // those that occur, sorted
+    std::vector<ClassExercise> exercises;  // likewise
+    std::map<ClassExercise, ExerciseReliability> reliability;
+    NeedsHelp help;
+
+    Standing standing(const std::string& trainee, const ClassExercise& exercise) const;
+    // Tip to target, mm, of each attempt that has it, oldest first.
+    std::vector<double> curve(const std::string& trainee, const ClassExercise& exercise) const;
 };
 
 // experts: trainees whom the educator calls so.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <utility>
 
 #include "runtime/player/words/words.h"
@@ -35,16 +36,20 @@ void keep_last(std::vector<float>& out, const std::vector<PoseResidual>& residua
     }
 }
 
-void show_point(const PointFit& fit, SetupView& view) {
+void show_point(const PointFit& fit,
+                std::span<const Pose> poses,
+                double needed_mm,
+                SetupView& view) {
     view.rms_mm = fit.rms_mm;
+    view.tilts = tilt_fields(poses, fit.tip_mm);
     view.coverage = std::clamp(fit.swing.z / kGoodTilt, 0.0, 1.0);
     keep_last(view.residuals_mm, fit.residuals);
     if (!fit.determined) {
         view.sentence = fit.problem;
         return;
     }
-    view.sigma_mm = worst(fit.sigma_mm);
-    view.good_enough = fit.inliers >= 30 && view.sigma_mm < 1 && view.coverage > 0.5;
+    view.sigma_mm = view.figure_mm = worst(fit.sigma_mm);
+    view.good_enough = fit.inliers >= 30 && view.sigma_mm < needed_mm && view.coverage > 0.5;
     view.sentence = view.good_enough
                         ? number(tr("Good: the point is known to %.2f mm."), view.sigma_mm)
                     : view.coverage <= 0.5 ? tr("Tilt it further, in every direction.")
@@ -60,14 +65,71 @@ void show_direction(const DirectionFit& fit, SetupView& view) {
         return;
     }
     // At 100 mm, a deep target.
-    view.sigma_mm = 100 * fit.sigma_rad;
-    view.good_enough = fit.length_mm > 40 && fit.sigma_rad < 0.02;
+    view.sigma_mm = view.figure_mm = 100 * fit.sigma_rad;
+    view.good_enough =
+        fit.length_mm > 40 && view.figure_mm < setup_needed_mm(SetupStep::probe_depth);
     view.sentence = view.good_enough
                         ? number(tr("Good: known to %.2f degrees."), fit.sigma_rad * 57.29578)
                         : tr("Slide it further, straight and without turning it.");
 }
 
 }  // namespace
+
+double setup_seconds(SetupStep step) {
+    switch (step) {
+        case SetupStep::probe_depth:
+        case SetupStep::probe_lateral: return 10;
+        case SetupStep::needle: return 30;
+        case SetupStep::mannequin: return 40;
+        default: return 15;
+    }
+}
+
+double setup_needed_mm(SetupStep step) {
+    switch (step) {
+        case SetupStep::probe_tip: return 1;
+        case SetupStep::probe_depth:
+        case SetupStep::probe_lateral: return 2;
+        case SetupStep::needle: return 1.5;
+        case SetupStep::mannequin: return 4;
+        case SetupStep::trackers:
+        case SetupStep::done: break;
+    }
+    return 0;
+}
+
+std::optional<TiltFields> tilt_fields(std::span<const Pose> poses, Vector3 tip_mm) {
+    constexpr double kMinArmMm = 5;
+    Vector3 mean;
+    std::vector<Vector3> up;  // from the pin to the sensor
+    if (norm(tip_mm) < kMinArmMm) return std::nullopt;
+    for (const Pose& pose : poses) {
+        if (!pose.ok) continue;
+        up.push_back(normalized(-1 * (pose.tracker_from_tool.rotation * tip_mm)));
+        mean = mean + up.back();
+    }
+    if (up.empty() || norm(mean) < 1e-6) return std::nullopt;
+    mean = normalized(mean);
+    const Vector3 other = std::abs(mean.x) < 0.7 ? Vector3{1, 0, 0} : Vector3{0, 1, 0};
+    const Vector3 across = normalized(cross(mean, other)), along = cross(mean, across);
+    TiltFields fields;
+    for (const Vector3& u : up) {
+        const double x = dot(u, across), y = dot(u, along), n = std::hypot(x, y);
+        const double lean_rad = std::asin(std::clamp(n, 0.0, 1.0));
+        fields.x_rad = n > 0 ? lean_rad * x / n : 0;
+        fields.y_rad = n > 0 ? lean_rad * y / n : 0;
+        const double turn = std::atan2(y, x) / (2 * std::numbers::pi) + 0.5;  // [0, 1]
+        const auto sector = [&](int count) {
+            return std::min(static_cast<int>(turn * count), count - 1);
+        };
+        const int field = lean_rad < TiltFields::kInnerRad ? 0
+                          : lean_rad < TiltFields::kOuterRad
+                              ? 1 + sector(TiltFields::kInner)
+                              : 1 + TiltFields::kInner + sector(TiltFields::kOuter);
+        fields.leaned[static_cast<std::size_t>(field)] = true;
+    }
+    return fields;
+}
 
 const char* setup_title(SetupStep step) {
     switch (step) {
@@ -170,11 +232,12 @@ void SetupGuide::fit() {
     view_.readings = static_cast<int>(poses.size());
     view_.seconds = poses.empty() ? 0 : poses.back().timestamp_s - poses.front().timestamp_s;
     view_.good_enough = false;
+    view_.figure_mm = -1;
     switch (step_) {
         case SetupStep::probe_tip:
             if (poses.size() < kMinReadings) return;
             tip_ = fit_point(poses);
-            show_point(tip_, view_);
+            show_point(tip_, poses, setup_needed_mm(step_), view_);
             return;
         case SetupStep::probe_depth:
         case SetupStep::probe_lateral:
@@ -208,7 +271,7 @@ void SetupGuide::fit_needle_depths(const std::vector<Pose>& poses) {
     view_.recordings = static_cast<int>(depths_.size());
     if (recording_) {
         if (poses.size() < kMinReadings) return;
-        show_point(fit_point(poses), view_);
+        show_point(fit_point(poses), poses, setup_needed_mm(step_), view_);
         view_.good_enough = false;
         return;
     }
@@ -218,9 +281,10 @@ void SetupGuide::fit_needle_depths(const std::vector<Pose>& poses) {
     }
     needle_ = fit_needle(depths_);
     view_.rms_mm = needle_.rms_mm;
-    view_.sigma_mm = worst(needle_.tip_sigma_mm);
+    view_.sigma_mm = view_.figure_mm = worst(needle_.tip_sigma_mm);
+    view_.tilts.reset();
     view_.coverage = std::min(1.0, static_cast<double>(depths_.size()) / 3);
-    view_.good_enough = needle_.determined && view_.sigma_mm < 1.5;
+    view_.good_enough = needle_.determined && view_.sigma_mm < setup_needed_mm(step_);
     view_.sentence = !needle_.determined ? needle_.problem
                      : view_.good_enough
                          ? number(tr("Good: the tip is known to %.2f mm."), view_.sigma_mm)
@@ -252,7 +316,8 @@ void SetupGuide::fit_mannequin(const std::vector<Pose>& poses) {
     view_.sigma_mm = mannequin_.determined ? worst(mannequin_.sigma_mm) : -1;
     view_.residuals_mm.clear();
     for (double r : mannequin_.residuals_mm) view_.residuals_mm.push_back(static_cast<float>(r));
-    view_.good_enough = mannequin_.determined && mannequin_.rms_mm < 4;
+    view_.figure_mm = mannequin_.determined ? mannequin_.rms_mm : -1;
+    view_.good_enough = mannequin_.determined && mannequin_.rms_mm < setup_needed_mm(step_);
     view_.sentence =
         !mannequin_.determined ? mannequin_.problem
         : view_.good_enough

@@ -10,6 +10,8 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -27,6 +29,24 @@ inline constexpr int kSetupSteps = 7;
 const char* setup_title(SetupStep step);
 const char* setup_instruction(SetupStep step);
 
+// How long the readings of a step take, about.
+double setup_seconds(SetupStep step);
+
+// Where a tool that pivots on its tip has leaned, as fields seen along its mean direction: the
+// middle (0), six about it (1 to 6) and ten about those (7 to 16).
+struct TiltFields {
+    static constexpr int kInner = 6, kOuter = 10, kCount = 1 + kInner + kOuter;
+    // Where a ring begins, and where the outer one ends on the screen.
+    static constexpr double kInnerRad = 0.14, kOuterRad = 0.35, kEdgeRad = 0.6;
+
+    std::array<bool, kCount> leaned{};
+    double x_rad = 0, y_rad = 0;  // where the newest reading leans
+
+    int count() const { return static_cast<int>(std::count(leaned.begin(), leaned.end(), true)); }
+};
+// tip_mm: in the sensor's frame. Nothing if the sensor sits on the tip, where no lean shows.
+std::optional<TiltFields> tilt_fields(std::span<const Pose> poses, Vector3 tip_mm);
+
 // What the screen shows of the current step.
 struct SetupView {
     double seconds = 0;    // that the readings of this step span
@@ -34,11 +54,18 @@ struct SetupView {
     int recordings = 0;    // of the needle: depths recorded so far
     double rms_mm = -1;    // negative: no fit yet
     double sigma_mm = -1;  // standard deviation of what the step finds; negative: no fit yet
-    double coverage = 0;   // [0, 1]; 1: as much movement as the fit can use
+    // The figure that decides: how well the step's result is known, of a direction 100 mm away; of
+    // the mannequin how well the skin fits. Negative: none yet.
+    double figure_mm = -1;
+    double coverage = 0;              // [0, 1]; 1: as much movement as the fit can use
+    std::optional<TiltFields> tilts;  // of a step in which a tool pivots
     bool good_enough = false;
     std::string sentence;             // what is still missing, or that the step is done
     std::vector<float> residuals_mm;  // of the newest readings
 };
+
+// What the step's figure has to stay below; 0: it has none.
+double setup_needed_mm(SetupStep step);
 
 class SetupGuide {
   public:

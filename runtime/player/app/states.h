@@ -110,6 +110,8 @@ struct CaseState {
     std::unique_ptr<ScanThread> scan;
 
     const Exercise& exercise() const { return drawn ? *drawn : open->exercises[exercise_index]; }
+    // What a trainee reads of the exercise, in the language in use.
+    ExerciseTexts texts() const;
     const std::string& name() const { return open->bundle->manifest.case_name; }
     const ScanFrame& frame() const { return scan->frame(); }
     // Centres of the exercise's targets in the frame shown, where breathing has moved them;
@@ -313,6 +315,7 @@ struct BundleChooser {
 struct ClassPage {
     double scroll = 0;     // of its table, u
     int first_column = 0;  // exercise shown first in it
+    int exercise = 0;      // whose learning curves are shown
     std::string trainee;   // chosen on the page
     double remove_asked_s = -1e9;
 };

@@ -21,7 +21,11 @@ std::string TissueNames::at(const FrameInput& input, int column, int row) {
     if (column < 0 || row < 0 || column >= width_px_ || row >= height_px_) return {};
     const PixelTruth there = truth_.at(input, column, row);
     if (!there.scanned || there.label <= 0) return {};
-    return tissue_words(bundle_->labels[there.label].name);
+    return words(there.label, there.rest);
+}
+
+std::string TissueNames::words(int label, Point3 rest) const {
+    return tissue_words(label_at(axes_, bundle_->labels[label].name, rest));
 }
 
 std::vector<TissueName> TissueNames::outline(const FrameInput& input, std::span<std::uint8_t> rgb) {
@@ -61,11 +65,13 @@ std::vector<TissueName> TissueNames::outline(const FrameInput& input, std::span<
             std::hypot(column - cover.column / cover.count, row - cover.row / cover.count);
         if (off >= nearest[label]) continue;
         nearest[label] = off;
-        names[label] = {column, row, tissue_words(bundle_->labels[label].name)};
+        names[label] = {column, row, bundle_->labels[label].name};
     }
     std::vector<TissueName> found;
     for (const TissueName& name : names) {
-        if (!name.words.empty()) found.push_back(name);
+        if (name.words.empty()) continue;
+        found.push_back({name.column, name.row,
+                         at(input, static_cast<int>(name.column), static_cast<int>(name.row))});
     }
     return found;
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "formats/base/result.h"
+#include "formats/bundle/body_axes.h"
 #include "formats/bundle/case_bundle.h"
 #include "formats/exercise/exercise.h"
 #include "runtime/imaging/truth/frame_truth.h"
@@ -24,7 +25,7 @@ struct TissueName {
 class TissueNames {
   public:
     // bundle, exercise, options: of the engine whose frames are shown; the bundle must outlive
-    // this. Errors: those of TruthRenderer::create. Cost: some ms.
+    // this. Errors: those of TruthRenderer::create. Cost: some ms, and body_axes().
     static Result<TissueNames> create(CaseView bundle,
                                       const Exercise& exercise,
                                       const RenderOptions& options);
@@ -40,10 +41,17 @@ class TissueNames {
 
   private:
     TissueNames(TruthRenderer truth, CaseView bundle, int width_px, int height_px)
-        : truth_(std::move(truth)), bundle_(bundle), width_px_(width_px), height_px_(height_px) {}
+        : truth_(std::move(truth)),
+          bundle_(bundle),
+          axes_(body_axes(*bundle)),
+          width_px_(width_px),
+          height_px_(height_px) {}
+    // The name of what lies there.
+    std::string words(int label, Point3 rest) const;
 
     TruthRenderer truth_;
     CaseView bundle_;
+    BodyAxes axes_;
     int width_px_, height_px_;
     std::vector<std::uint8_t> labels_;
 };

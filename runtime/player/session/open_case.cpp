@@ -34,7 +34,22 @@ void add_own_exercises(OpenCase& open) {
     }
 }
 
+// Of an exercise that the bundle holds and that parses.
+std::vector<ExerciseTexts> embedded_texts(const OpenCase& open, const std::string& name) {
+    for (const EmbeddedExercise& embedded : open.bundle->exercises) {
+        if (embedded.name != name) continue;
+        if (auto texts = parse_exercise_texts(embedded.toml, open.path)) return std::move(*texts);
+    }
+    return {};
+}
+
 }  // namespace
+
+ExerciseTexts texts_of(const OpenCase& open, int exercise, const std::string& language) {
+    const auto at = static_cast<std::size_t>(exercise);
+    static const std::vector<ExerciseTexts> kNone;
+    return texts_in(open.exercises[at], at < open.texts.size() ? open.texts[at] : kNone, language);
+}
 
 Result<std::unique_ptr<OpenCase>> open_case(const std::string& path) {
     SONOCASE_TRY(StreamedBundle bundle, open_bundle(path));
@@ -45,6 +60,8 @@ Result<std::unique_ptr<OpenCase>> open_case(const std::string& path) {
     open->exercises = std::move(found.exercises);
     open->warnings = std::move(found.warnings);
     open->exercise_digests = std::move(found.digests);
+    for (const Exercise& exercise : open->exercises)
+        open->texts.push_back(embedded_texts(*open, exercise.name));
     add_own_exercises(*open);
     return open;
 }
@@ -72,6 +89,7 @@ Result<int> choose_or_load_exercise(OpenCase& open, const std::string& name_or_f
         return find_exercise(open, name_or_file);
     SONOCASE_TRY(const std::string text, read_text_file(file));
     SONOCASE_TRY(Exercise exercise, parse_exercise(text, file));
+    SONOCASE_TRY(auto texts, parse_exercise_texts(text, file));
     const CaseAnatomy anatomy(open.bundle);
     for (const Target& target : exercise.targets) {
         const auto label = static_cast<std::size_t>(anatomy.label(target.centre));
@@ -92,6 +110,8 @@ Result<int> choose_or_load_exercise(OpenCase& open, const std::string& name_or_f
     open.exercise_digests[at] = digest_of(text);
     open.exercise_files.resize(std::max(open.exercise_files.size(), at + 1));
     open.exercise_files[at] = file;
+    open.texts.resize(std::max(open.texts.size(), at + 1));
+    open.texts[at] = std::move(texts);
     return static_cast<int>(at);
 }
 

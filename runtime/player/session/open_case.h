@@ -11,6 +11,7 @@
 
 #include "formats/bundle/case_bundle.h"
 #include "formats/exercise/exercise.h"
+#include "formats/exercise/exercise_texts.h"
 #include "runtime/engine/scan_engine.h"
 #include "runtime/imaging/renderer.h"
 #include "runtime/player/session/arguments.h"
@@ -24,6 +25,7 @@ struct OpenCase {
     std::vector<Exercise> exercises;                   // at least one: without any, a free scan
     std::vector<std::string> exercise_digests;         // of their TOML; may be shorter
     std::vector<std::string> exercise_files;           // empty name: in the bundle; may be shorter
+    std::vector<std::vector<ExerciseTexts>> texts;     // other languages'; may be shorter
     std::shared_ptr<const PhysicalTextures> textures;  // null: each renderer makes its own
     std::vector<Message> warnings;                     // whole sentences
 };
@@ -33,6 +35,9 @@ struct OpenCase {
 // case is on the heap, because renderer and skin point into it. Errors: a file that cannot be read
 // or is not a bundle.
 Result<std::unique_ptr<OpenCase>> open_case(const std::string& path);
+
+// What a trainee reads of an exercise of the case, in a language (ISO 639-1).
+ExerciseTexts texts_of(const OpenCase& open, int exercise, const std::string& language);
 
 // An Error after a part of the bundle that a frame needed turned out to be damaged. Constant time,
 // without allocation while nothing is damaged; for the frame loop.

@@ -288,9 +288,9 @@ void draw_buttons(Ui& ui, Box row, const SessionView& session, Requests& request
     const CaseState& loaded = session.loaded;
     const auto count = static_cast<int>(loaded.open->exercises.size());
     if (narrow || count < 2) return;
-    const Exercise& next = loaded.open->exercises[(loaded.exercise_index + 1) % count];
     const std::string words =
-        std::string(tr("Next")) + ": " + (next.title.empty() ? next.name : next.title);
+        std::string(tr("Next")) + ": " +
+        texts_of(*loaded.open, (loaded.exercise_index + 1) % count, language_in_use().code).title;
     ButtonStyle style;
     style.ghost = true;
     style.may_cut = true;
@@ -316,8 +316,7 @@ void draw_after_page(
     style.tip = "Settings and panels";
     if (ui.button("settings", bar.take_right(44, 8).inset(0, 2), "", style))
         screen.dialog = Dialog::settings;
-    const Exercise& exercise = session.loaded.exercise();
-    const std::string title = exercise.title.empty() ? exercise.name : exercise.title;
+    const std::string title = session.loaded.texts().title;
     if (!show_notice(notices, ui, bar))
         ui.text(bar, title + " · " + tr(training.exam ? "exam" : "practice"), Type::body,
                 colour::kDim, Align::left, true);

@@ -79,6 +79,7 @@ CineRequest draw_cine_bar(
     ButtonStyle style;
     style.icon = Icon::clip;
     style.tip = "Saves the last 20 s as a film (Shift + F12)";
+    style.enabled = input.enabled;
     const bool narrow = rest.w < 420;
     if (!input.replay) {
         if (!narrow) request.save_clip = ui.button("clip", rest.take_right(52, 8), "", style);

@@ -32,11 +32,31 @@ void draw_cell(Ui& ui, const Box& box, const Standing& now) {
             now.attempts ? colour::kText : colour::kDim, Align::left, true);
 }
 
-constexpr float kTableRow = 44, kMinColumn = 116;
+constexpr float kTableRow = 44, kHeadRow = 44, kMinColumn = 132;
+
+// The title of an exercise, where its case is among those of the start page, and the case's.
+struct ExerciseTitle {
+    std::string exercise, of_case;
+};
+ExerciseTitle title_of(const ClassExercise& exercise, const BundleChooser& chooser) {
+    for (const BundleEntry& entry : chooser.bundles) {
+        const auto card = chooser.cards ? chooser.cards->find(entry.path) : nullptr;
+        if (!card || card->case_name != exercise.case_name) continue;
+        for (const CaseCard::Exercise& one : card->exercises)
+            if (one.name == exercise.name) return {title_of(one), card->title};
+        return {exercise.name, card->title};
+    }
+    return {exercise.name, exercise.case_name};
+}
 
 // The columns are exercises; where not all fit, arrows go to the others.
-void draw_table_head(
-    ClassPage& page, Ui& ui, Box head, float name, const ClassRecords& records, int shown) {
+void draw_table_head(ClassPage& page,
+                     const BundleChooser& chooser,
+                     Ui& ui,
+                     Box head,
+                     float name,
+                     const ClassRecords& records,
+                     int shown) {
     const auto all = static_cast<int>(records.exercises.size());
     int& first = page.first_column;
     first = std::clamp(first, 0, std::max(all - shown, 0));
@@ -54,18 +74,39 @@ void draw_table_head(
         if (ui.button("later", arrows.take_left(44, 4), "", style)) first += shown;
         first = std::clamp(first, 0, all - shown);
     }
-    for (int i = 0; i < shown; ++i)
-        ui.text(head.column(i, shown, 8), records.exercises[first + i], Type::small, colour::kDim,
+    for (int i = 0; i < shown; ++i) {
+        const int at = first + i;
+        const Box box = head.column(i, shown, 8);
+        const ExerciseTitle title =
+            title_of(records.exercises[static_cast<std::size_t>(at)], chooser);
+        ButtonStyle style;
+        style.ghost = true;
+        style.tip = "Learning curves of this exercise";
+        char id[32];
+        std::snprintf(id, sizeof id, "column%d", at);
+        if (ui.button(id, box, "", style)) page.exercise = at;
+        ui.begin_in_control();
+        const bool chosen = page.exercise == at;
+        if (chosen) ui.fill({box.x, box.bottom() - 3, box.w, 3}, colour::kAccent, 1.5f);
+        ui.text({box.x + 4, box.y + 1, box.w - 8, 20}, title.exercise, Type::small,
+                chosen ? colour::kText : colour::kDim, Align::left, true);
+        ui.text({box.x + 4, box.y + 20, box.w - 8, 20}, title.of_case, Type::small, colour::kDim,
                 Align::left, true);
+        ui.end_in_control();
+    }
 }
 
-void draw_table(ClassPage& page, Ui& ui, const Box& card, const ClassRecords& records) {
+void draw_table(ClassPage& page,
+                const BundleChooser& chooser,
+                Ui& ui,
+                const Box& card,
+                const ClassRecords& records) {
     ui.card(card, "table");
     Box room = card.inset(16, 12);
     const float name = std::clamp(0.3f * room.w, 110.0f, 220.0f);
     const auto all = static_cast<int>(records.exercises.size());
     const int shown = std::clamp(static_cast<int>((room.w - name) / kMinColumn), 1, all);
-    draw_table_head(page, ui, room.take_top(kTableRow), name, records, shown);
+    draw_table_head(page, chooser, ui, room.take_top(kHeadRow), name, records, shown);
     ui.clip(room);
     const double over = kTableRow * static_cast<double>(records.trainees.size()) - room.h;
     ui.scroll_by_wheel(room, page.scroll, std::max(over, 0.0));
@@ -92,43 +133,74 @@ void draw_table(ClassPage& page, Ui& ui, const Box& card, const ClassRecords& re
     ui.unclip();
 }
 
-// Tip to target over attempts: everyone grey, the chosen one in the accent colour.
-void draw_curves(const std::string& chosen_trainee,
+// Tip to target over attempts at the chosen exercise: everyone grey, the chosen trainee in the
+// accent colour and named.
+void draw_curves(const ClassPage& page,
+                 const BundleChooser& chooser,
                  Ui& ui,
                  const Box& card,
                  const ClassRecords& records) {
     ui.card(card, "curves");
     Box room = card.inset(16, 12);
-    ui.text(room.take_top(24), tr("Tip to target over attempts, mm"), Type::bold, colour::kText,
+    const auto at = std::min(static_cast<std::size_t>(page.exercise), records.exercises.size() - 1);
+    const ClassExercise& exercise = records.exercises[at];
+    ui.text(room.take_top(24), title_of(exercise, chooser).exercise, Type::bold, colour::kText,
             Align::left, true);
-    Box plot = room.inset(8, 14);
-    double max_mm = 1;
+    ui.text(room.take_top(20, 6), tr("Tip to target over attempts, mm"), Type::small, colour::kDim,
+            Align::left, true);
+    if (room.h < 60) return;
+    // Room for the figures of both axes.
+    const Box plot{room.x + 34, room.y + 8, room.w - 50, room.h - 32};
+    double max_mm = 5;
     std::size_t longest = 2;
-    for (const auto& [trainee, curve] : records.curves) {
-        longest = std::max(longest, curve.size());
-        for (const double mm : curve) max_mm = std::max(max_mm, mm);
+    std::vector<std::pair<std::string, std::vector<double>>> curves;
+    for (const std::string& trainee : records.trainees) {
+        curves.emplace_back(trainee, records.curve(trainee, exercise));
+        longest = std::max(longest, curves.back().second.size());
+        for (const double mm : curves.back().second) max_mm = std::max(max_mm, mm);
     }
-    ui.line(plot.x, plot.bottom(), plot.right(), plot.bottom(), colour::kLine);
-    ui.text({plot.x, plot.y - 16, 80, 18}, text("%.0f mm", max_mm), Type::small, colour::kDim);
+    max_mm = 5 * std::ceil(max_mm / 5);
+    const auto x_of = [&](std::size_t i) {
+        return plot.x + plot.w * static_cast<float>(i) / static_cast<float>(longest - 1);
+    };
+    const auto y_of = [&](double mm) {
+        return plot.bottom() - plot.h * static_cast<float>(mm / max_mm);
+    };
+    ui.line(plot.x, plot.bottom(), plot.right(), plot.bottom(), colour::kEdge);
+    ui.line(plot.x, plot.y, plot.x, plot.bottom(), colour::kEdge);
+    for (const double mm : {0.0, 0.5 * max_mm, max_mm}) {
+        ui.line(plot.x - 4, y_of(mm), plot.x, y_of(mm), colour::kEdge);
+        ui.text({room.x, y_of(mm) - 9, 28, 18}, text("%.0f", mm), Type::small, colour::kDim,
+                Align::right, true);
+    }
+    const std::size_t step = (longest + 7) / 8;
+    for (std::size_t i = 0; i < longest; i += step)
+        ui.text({x_of(i) - 14, plot.bottom() + 2, 28, 18}, std::to_string(i + 1), Type::small,
+                colour::kDim, Align::centre, true);
     for (const bool chosen : {false, true}) {
-        for (const auto& [trainee, curve] : records.curves) {
-            if ((trainee == chosen_trainee) != chosen) continue;
+        for (const auto& [trainee, curve] : curves) {
+            if ((trainee == page.trainee) != chosen || curve.empty()) continue;
             std::vector<float> xy;
             for (std::size_t i = 0; i < curve.size(); ++i) {
-                xy.push_back(plot.x +
-                             plot.w * static_cast<float>(i) / static_cast<float>(longest - 1));
-                xy.push_back(plot.bottom() - plot.h * static_cast<float>(curve[i] / max_mm));
+                xy.push_back(x_of(i));
+                xy.push_back(y_of(curve[i]));
             }
             ui.curve(xy, chosen ? colour::kAccent : colour::kEdge, chosen ? 2.5f : 1.0f);
             for (std::size_t i = 0; i + 1 < xy.size(); i += 2)
                 ui.disc(xy[i], xy[i + 1], chosen ? 4.0f : 2.0f,
                         chosen ? colour::kAccent : colour::kEdge);
+            if (chosen)
+                ui.text({plot.x + 6, plot.y - 6, plot.w - 6, 18}, trainee, Type::small,
+                        colour::kAccent, Align::right, true);
         }
     }
 }
 
 // Alpha and the pass mark of each exercise, with what they rest on.
-void draw_reliability(Ui& ui, const Box& card, const ClassRecords& records) {
+void draw_reliability(const BundleChooser& chooser,
+                      Ui& ui,
+                      const Box& card,
+                      const ClassRecords& records) {
     ui.card(card, "reliability");
     Box room = card.inset(16, 12);
     ui.text(room.take_top(24), tr("Reliability"), Type::bold, colour::kText, Align::left, true);
@@ -137,7 +209,7 @@ void draw_reliability(Ui& ui, const Box& card, const ClassRecords& records) {
            "and first attempts cross");
     const float high = std::min(ui.paragraph_height(room.w, what, Type::small), 54.0f);
     ui.paragraph(room.take_top(high, 6), what, Type::small, colour::kDim, true);
-    for (const std::string& exercise : records.exercises) {
+    for (const ClassExercise& exercise : records.exercises) {
         if (room.h < 28) return;
         const Box row = room.take_top(28);
         const auto found = records.reliability.find(exercise);
@@ -151,8 +223,8 @@ void draw_reliability(Ui& ui, const Box& card, const ClassRecords& records) {
                           r.groups.novices);
         std::snprintf(words, sizeof words, "%s %s   %s %s", tr("alpha"), alpha, tr("pass mark"),
                       mark);
-        ui.text({row.x, row.y, 0.4f * row.w, row.h}, exercise, Type::small, colour::kDim,
-                Align::left, true);
+        ui.text({row.x, row.y, 0.4f * row.w, row.h}, title_of(exercise, chooser).exercise,
+                Type::small, colour::kDim, Align::left, true);
         ui.text({row.x + 0.4f * row.w, row.y, 0.6f * row.w, row.h}, words, Type::small,
                 colour::kText, Align::right, true);
     }
@@ -172,7 +244,11 @@ void draw_files(PlayerState& player, ClassPage& page, Ui& ui, Box row) {
                       style))
             save_class_file(player, file.id);
     }
-    if (page.trainee.empty()) return;
+    if (page.trainee.empty()) {
+        ui.text(row, tr("Choose a trainee in the table"), Type::small, colour::kDim, Align::right,
+                true);
+        return;
+    }
     ButtonStyle expert;
     expert.icon = Icon::user;
     expert.tip = "This trainee's results set the pass mark";
@@ -197,15 +273,46 @@ void draw_files(PlayerState& player, ClassPage& page, Ui& ui, Box row) {
     }
 }
 
+// What an educator makes, of the case that is open.
+void draw_actions(bool case_open, Screen& screen, Ui& ui, Box& bar, Requests& requests) {
+    const auto button = [&](const char* id, const char* words, Icon icon, const char* tip) {
+        ButtonStyle style;
+        style.icon = icon;
+        style.enabled = case_open;
+        style.tip = case_open ? tip : "Open a case first";
+        const float wide = 56 + ui.width(tr(words), Type::body);
+        return wide < 0.4f * bar.w &&
+               ui.button(id, bar.take_right(wide, 8).inset(0, 6), tr(words), style);
+    };
+    if (button("new_exercise", "New exercise", Icon::plus,
+               "A target of your own, placed in the picture of the case that is open")) {
+        screen.page = Page::scan;
+        requests.push_back(request::BeginNewTarget{});
+    }
+    if (button("exam_set", "Exam set and marks", Icon::lock,
+               "Which exercises an exam asks for, and what has to be reached")) {
+        screen.page = Page::scan;
+        screen.dialog = Dialog::exercises;
+    }
+}
+
 }  // namespace
 
-void draw_class_page(PlayerState& player, ClassPage& page, Screen& screen, Ui& ui) {
+void draw_class_page(PlayerState& player,
+                     ClassPage& page,
+                     const BundleChooser& chooser,
+                     bool case_open,
+                     Screen& screen,
+                     Ui& ui,
+                     Requests& requests) {
     const Box window = ui.window();
     const PageLayout layout = page_layout(window.w, window.h);
     Box bar = layout.bar;
     if (back_button(ui, bar, "cases", tr("Cases"), "Back to all cases"))
         screen.page = Page::bundles;
-    if (!show_notice(player.notices, ui, bar)) ui.text(bar, tr("Class"), Type::heading);
+    if (layout.columns > 1) draw_actions(case_open, screen, ui, bar, requests);
+    if (!show_notice(player.notices, ui, bar))
+        ui.text(bar, tr("Class"), Type::heading, colour::kText, Align::left, true);
     const ClassRecords& records = class_records(player);
     Box content = layout.content;
     if (records.trainees.empty()) {
@@ -215,18 +322,26 @@ void draw_class_page(PlayerState& player, ClassPage& page, Screen& screen, Ui& u
         return;
     }
     const Box files = content.take_bottom(48, 12);
-    if (!records.sentence.empty())
-        ui.text(content.take_top(32, 4), records.sentence, Type::body, colour::kText, Align::left,
-                true);
+    if (const NeedsHelp& help = records.help; !help.trainee.empty()) {
+        char words[320];
+        std::snprintf(words, sizeof words, tr("%s may need help with %s: %d attempts, no pass."),
+                      help.trainee.c_str(), title_of(help.exercise, chooser).exercise.c_str(),
+                      help.attempts);
+        Box line = content.take_top(32, 4);
+        ui.icon(Icon::warn, line.x, line.y + 7, 18, colour::kWarn);
+        line.take_left(26);
+        ui.text(line, words, Type::body, colour::kText, Align::left, true);
+    }
     if (layout.columns >= 3) {
         Box side = content.take_right(0.34f * content.w, 16);
         if (side.h > 420)
-            draw_reliability(ui, side.take_bottom(std::min(0.4f * side.h, 260.0f), 12), records);
-        draw_curves(page.trainee, ui, side, records);
+            draw_reliability(chooser, ui, side.take_bottom(std::min(0.4f * side.h, 260.0f), 12),
+                             records);
+        draw_curves(page, chooser, ui, side, records);
     } else if (content.h > 420) {
-        draw_curves(page.trainee, ui, content.take_bottom(200, 12), records);
+        draw_curves(page, chooser, ui, content.take_bottom(200, 12), records);
     }
-    draw_table(page, ui, content, records);
+    draw_table(page, chooser, ui, content, records);
     draw_files(player, page, ui, files);  // last: it may let go of the records
 }
 

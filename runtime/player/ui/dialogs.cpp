@@ -140,7 +140,8 @@ void draw_exercises(
         style.icon = Icon::target;
         style.chosen = static_cast<int>(i) == loaded.exercise_index;
         style.may_cut = true;
-        const std::string title = exercise.title.empty() ? exercise.name : exercise.title;
+        const std::string title =
+            texts_of(*loaded.open, static_cast<int>(i), language_in_use().code).title;
         const bool chosen = ui.button(exercise.name.c_str(), row, title, style);
         ImGui::PopID();
         if (chosen)
@@ -424,6 +425,11 @@ void draw_tracker(const SessionView& session, Screen& screen, Ui& ui, Requests& 
     const Box room = begin_page_dialog(ui, screen, "Tracker", 420, 560);
     std::optional<std::string> chosen;
     flow(ui, room, "tracker", [&] {
+        // Fields and buttons of 44 u, and room between them.
+        const float s = ui.scale();
+        const float pad = std::max(0.5f * (44 * s - ImGui::GetFontSize()), 0.0f);
+        ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, {12 * s, pad});
+        ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {8 * s, 6 * s});
         chosen = draw_tracker_panel({.spec = tracker.spec,
                                      .sweeps = loaded.exercise().sweeps,
                                      .health = session.tracker,
@@ -431,6 +437,7 @@ void draw_tracker(const SessionView& session, Screen& screen, Ui& ui, Requests& 
                                      .assignment = session.scan.console.controls.assignment,
                                      .calibrations = loaded.set_up.calibrations,
                                      .paced = tracker.paced.get()});
+        ImGui::PopStyleVar(2);
     });
     ui.end_layer();
     if (chosen) requests.push_back(request::ChooseTracker{*chosen});

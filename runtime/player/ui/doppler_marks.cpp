@@ -88,11 +88,13 @@ void draw_gate(const ImagePlace& place,
                 false, s);
 }
 
-// Velocities beside the strip: the ends of the scale and 0.
+// Velocities beside the strip, corrected by the angle cursor as the measures are: the ends of the
+// scale and 0.
 void draw_velocities(Ui& ui, const Box& box, const DopplerSettings& d) {
+    const double cosine = std::cos(std::clamp(d.angle_deg, -80.0, 80.0) * kPi / 180);
     const double zero = 0.5 + 0.5 * std::clamp(d.baseline, -0.9, 0.9);  // from the top
-    const double upper = d.spectral_scale_cm_s * (1 + d.baseline),
-                 lower = -d.spectral_scale_cm_s * (1 - d.baseline);
+    const double upper = d.spectral_scale_cm_s * (1 + d.baseline) / cosine,
+                 lower = -d.spectral_scale_cm_s * (1 - d.baseline) / cosine;
     const float x = box.right() - 52;
     const auto label = [&](double share, double cm_s) {
         const float y = box.y + static_cast<float>(share) * box.h;
@@ -109,7 +111,9 @@ void draw_velocities(Ui& ui, const Box& box, const DopplerSettings& d) {
 void draw_measures(Ui& ui, const Box& box, const ScanFrame& frame) {
     const doppler::SpectralMeasures& m = frame.doppler.measures;
     char words[160];
-    if (m.beats > 0) {
+    if (m.beats > 0 && m.psv_cm_s < 0.05) {
+        std::snprintf(words, sizeof words, "PSV –  EDV –  RI –   %s", tr("no flow in the gate"));
+    } else if (m.beats > 0) {
         std::snprintf(words, sizeof words, tr("PSV %.1f  EDV %.1f cm/s  RI %.2f  flow %.0f ml/min"),
                       m.psv_cm_s, m.edv_cm_s, m.resistive_index, m.flow_ml_min);
     } else {

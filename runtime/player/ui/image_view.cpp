@@ -298,13 +298,36 @@ void draw_names(Ui& ui, const Box& area, const ImagePlace& place, const ImageVie
             Align::left, true);
 }
 
-void draw_stopped(Ui& ui, const Box& area, const ImageViewInput& input) {
+// The buttons of the box, whose place the picture's own area must not take.
+void draw_stopped_buttons(Ui& ui, Box row, ImagePlace& place) {
+    ButtonStyle style;
+    style.primary = true;
+    style.key = "F3";
+    style.tip = "Sensors, calibration and what the tracker says";
+    const bool narrow = row.w < 360;
+    const float wide = narrow ? 0.5f * row.w - 4 : 70 + ui.width(tr("Open set-up"), Type::bold);
+    place.open_setup = ui.button("open_setup", row.take_left(wide, 8),
+                                 tr(narrow ? "Set-up" : "Open set-up"), style);
+    style = {};
+    style.tip = "Ends an attempt that runs; the mouse then moves the probe";
+    place.use_mouse = ui.button(
+        "use_mouse",
+        row.take_left(narrow ? row.w : 28 + ui.width(tr("Go on with the mouse"), Type::body)),
+        tr(narrow ? "Mouse" : "Go on with the mouse"), style);
+}
+
+Box stopped_box(const Box& area) {
+    const float wide = std::min(480.0f, area.w - 24), high = std::min(256.0f, area.h - 16);
+    return {area.x + 0.5f * (area.w - wide), area.y + 0.5f * (area.h - high), wide, high};
+}
+
+void draw_stopped(Ui& ui, const Box& area, const ImageViewInput& input, ImagePlace& place) {
     ui.fill(area, colour::rgba(0, 0, 0, 168));
-    const float wide = std::min(460.0f, area.w - 24), high = std::min(170.0f, area.h - 24);
-    const Box box{area.x + 0.5f * (area.w - wide), area.y + 0.5f * (area.h - high), wide, high};
+    const Box box = stopped_box(area);
     ui.fill(box, colour::kPanel, 8);
-    ui.outline(box, colour::kEdge, 1, 8);
+    ui.outline(box, colour::kWarn, 2, 8);
     Box room = box.inset(16, 12);
+    if (input.stopped_buttons) draw_stopped_buttons(ui, room.take_bottom(48, 8), place);
     Box head = room.take_top(40, 4);
     ui.icon(Icon::warn, head.x, head.y + 8, 24, colour::kWarn);
     char words[64];
@@ -313,11 +336,15 @@ void draw_stopped(Ui& ui, const Box& area, const ImageViewInput& input) {
     if (input.stopped_s >= 1)
         ui.text(head.take_right(ui.width(words, Type::small) + 4), words, Type::small, colour::kDim,
                 Align::right);
-    ui.text({head.x + 34, head.y, head.w - 34, head.h}, tr("NO TRACKER"), Type::heading,
-            colour::kWarn);
-    const std::string all =
-        input.stopped + "\n" + tr("Scanning goes on by itself when it answers.");
-    ui.paragraph(room, all, Type::small, colour::kText, true);
+    const bool large = ui.width(tr("NO TRACKER"), Type::title) < head.w - 34 && room.h > 120;
+    ui.text({head.x + 34, head.y, head.w - 34, head.h}, tr("NO TRACKER"),
+            large ? Type::title : Type::heading, colour::kWarn);
+    const char* goes_on = tr("Scanning goes on by itself when it answers.");
+    const Type type = room.h > 100 ? Type::body : Type::small;
+    const float last = ui.paragraph_height(room.w, goes_on, Type::small);
+    const bool both = ui.paragraph_height(room.w, input.stopped, type) + last < room.h;
+    room.take_top(ui.paragraph(room, input.stopped, type, colour::kText, true), 6);
+    if (both) ui.paragraph(room, goes_on, Type::small, colour::kDim, true);
 }
 
 void dotted_ring(ImDrawList* draw, ImVec2 centre, float radius, float s) {
@@ -383,7 +410,8 @@ ImagePlace draw_image_view(Ui& ui, const Box& area, const ImageViewInput& input)
     ImagePlace place;
     const float s = ui.scale();
     ui.picture(area, "picture");
-    const Ui::Area mouse = ui.area("picture", area);
+    // A picture that is not live takes no mouse: the box over it has buttons.
+    const Ui::Area mouse = input.stopped.empty() ? ui.area("picture", area) : Ui::Area{};
     place.hovered = mouse.hovered || mouse.held;
     const ScanFrame& frame = input.frame;
     const bool strip = input.doppler && has_strip(input.doppler->mode);
@@ -421,7 +449,7 @@ ImagePlace draw_image_view(Ui& ui, const Box& area, const ImageViewInput& input)
     draw_names(ui, area, place, input);
     if (input.marks && input.marks->body) draw_body_mark(ui, body_mark_box(area), *input.marks);
     if (frame.frozen) draw_frozen_sign(ui, area, frame.cine_age_s);
-    if (!input.stopped.empty()) draw_stopped(ui, area, input);
+    if (!input.stopped.empty()) draw_stopped(ui, area, input, place);
     ui.unclip();
     return place;
 }

@@ -39,7 +39,8 @@ struct ImageViewInput {
     // What is wrong with the tracker, a sentence; the picture is then not live and is drawn dark.
     // Empty: nothing.
     std::string stopped{};
-    double stopped_s = 0;  // for so long
+    double stopped_s = 0;         // for so long
+    bool stopped_buttons = true;  // with ways out of it
 };
 
 // Where the picture is on the screen, to turn a place on one into a place on the other.
@@ -49,6 +50,8 @@ struct ImagePlace {
     double origin_x = 0, origin_y = 0;  // screen pixel of the middle of the probe's face
     float px_per_image_px = 1;          // screen pixels per pixel of the frame
     bool hovered = false;               // the mouse is over the picture, or dragging from it
+    // Asked for while the tracker does not answer.
+    bool open_setup = false, use_mouse = false;
 };
 
 // Size in pixels in which to render the picture, so that the sector fills the area less the room

@@ -54,7 +54,7 @@ void draw_head(const SessionView& session, Ui& ui, Box& room) {
     const CaseState& loaded = session.loaded;
     const Training& training = session.scan.training;
     const Exercise& exercise = loaded.exercise();
-    const std::string title = exercise.title.empty() ? exercise.name : exercise.title;
+    const std::string title = loaded.texts().title;
     const float line = ui.line_height(Type::heading);
     const float high = std::min(ui.paragraph_height(room.w, title, Type::heading), 2 * line + 1);
     ui.paragraph(room.take_top(high, 2), title, Type::heading, colour::kText, true);
@@ -201,6 +201,7 @@ void draw_picture(const SessionView& session, const ViewState& view, Ui& ui, con
     if (!session.live && !controls.frozen)
         input.stopped = session.tracker.message.empty() ? tr("No reading from the tracker yet")
                                                         : tr_message(session.tracker.message);
+    input.stopped_buttons = false;
     input.left_lines = {std::string(tr("Depth")) +
                         text(" %.0f cm", loaded.engine.image.depth_mm / 10)};
     const ImagePlace place = draw_image_view(ui, area, input);

@@ -320,7 +320,7 @@ void handle_scan_keys(const SessionView& session,
     if (pressed(GLFW_KEY_Y)) toggle_zoom(view.tools.marks);
     if (pressed(GLFW_KEY_G)) adjust_gain(session.loaded.frame(), console.controls.settings);
     if (pressed(GLFW_KEY_F)) flipped = !flipped;
-    if (pressed(GLFW_KEY_B)) requests.push_back(request::ToggleAttempt{});
+    if (pressed(GLFW_KEY_B) && session.live) requests.push_back(request::ToggleAttempt{});
     if (pressed(GLFW_KEY_H)) requests.push_back(request::NextHint{});
     if (pressed(GLFW_KEY_N)) requests.push_back(request::ToggleNeedle{!ImGui::GetIO().KeyShift});
     if (pressed(GLFW_KEY_O)) step_view(session.loaded.view3d->from());

@@ -56,7 +56,14 @@ void draw_scan_page(const SessionView& session,
 // After an attempt, whose result there is.
 void draw_after_page(
     const SessionView& session, Notices& notices, Screen& screen, Ui& ui, Requests& requests);
-void draw_class_page(PlayerState& player, ClassPage& page, Screen& screen, Ui& ui);
+// chooser: whose cases give exercises their titles.
+void draw_class_page(PlayerState& player,
+                     ClassPage& page,
+                     const BundleChooser& chooser,
+                     bool case_open,
+                     Screen& screen,
+                     Ui& ui,
+                     Requests& requests);
 // What is open over the page.
 void draw_dialogs(
     const SessionView& session, PlayerState& player, ViewState& view, Ui& ui, Requests& requests);

@@ -37,6 +37,7 @@ bool draw_notice(Ui& ui, const Box& box, const Notice& notice);
 
 struct TaskCardInput {
     const Exercise& exercise;
+    const ExerciseTexts& texts;                // of it, in the language in use
     const FrameRecord& record;                 // of the frame shown
     std::span<const Point3> target_centres;    // # targets, `mannequin` frame
     const std::vector<bool>& targets_reached;  // # targets
@@ -141,16 +142,26 @@ std::optional<std::string> draw_tracker_panel(const TrackerPanelInput& input);
 // Times of the effects, from the frame shown. Draws into the current ImGui window.
 void draw_effects_panel(const ScanFrame& frame, float scale);
 
-// What the hands do in a step, as a drawing in the current ImGui window.
-void draw_setup_drawing(SetupStep step, float scale);
+// What the hands do in a step, as a drawing.
+void draw_setup_drawing(Ui& ui, const Box& box, SetupStep step);
 
-// The guided set-up. Changes the assignment of sensors. True: save the calibrations.
-bool draw_setup_window(SetupGuide& guide,
-                       const TrackerHealth& tracker,
-                       const TrackerReading& reading,
-                       const Calibrations& calibrations,
-                       SensorAssignment& assignment,
-                       bool& open,
-                       float scale);
+// The guided set-up, in the place of the scanning page.
+struct SetupPageInput {
+    const TrackerHealth& tracker;
+    const TrackerReading& reading;  // the newest
+    bool live;                      // false: no readings arrive, what there are is old
+    const Calibrations& calibrations;
+    const ImageTexture& picture;  // of the newest frame, for the last step
+    int width_px, height_px;      // its size
+};
+struct SetupRequest {
+    bool save = false, close = false;
+};
+// Changes the assignment of sensors.
+SetupRequest draw_setup_page(Ui& ui,
+                             Notices& notices,
+                             SetupGuide& guide,
+                             SensorAssignment& assignment,
+                             const SetupPageInput& input);
 
 }  // namespace sonocase::runtime::inline player_ui

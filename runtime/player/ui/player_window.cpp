@@ -52,11 +52,18 @@ void PlayerWindow::show_setup(const TrackerHealth& tracker) {
     SensorAssignment& assignment = scan_.console.controls.assignment;
     SetUp& set_up = loaded_.set_up;
     follow_setup(loaded_, assignment, player_.now_s);
-    const bool save =
-        draw_setup_window(*set_up.guide, tracker, loaded_.frame().reading, set_up.calibrations,
-                          assignment, view_.screen.show_setup, ui_.scale());
-    if (save && save_calibrations(set_up.calibrations, player_.settings, player_.notices))
-        view_.screen.show_setup = false;
+    const SetupRequest wanted =
+        draw_setup_page(ui_, player_.notices, *set_up.guide, assignment,
+                        {.tracker = tracker,
+                         .reading = loaded_.frame().reading,
+                         .live = tracker_is_live(loaded_, scan_.tracker, tracker),
+                         .calibrations = set_up.calibrations,
+                         .picture = *view_.display.texture,
+                         .width_px = loaded_.frame().width_px,
+                         .height_px = loaded_.frame().height_px});
+    const bool saved =
+        wanted.save && save_calibrations(set_up.calibrations, player_.settings, player_.notices);
+    if (wanted.close || saved) view_.screen.show_setup = false;
 }
 
 void PlayerWindow::draw_page(const TrackerHealth& tracker) {
@@ -72,17 +79,23 @@ void PlayerWindow::draw_page(const TrackerHealth& tracker) {
             break;
         case Page::scan:
             follow_session();
-            draw_scan_page(session, player_.notices, scan_.console, view_, ui_, requests_);
+            if (screen.show_setup) {
+                show_setup(tracker);
+            } else {
+                draw_scan_page(session, player_.notices, scan_.console, view_, ui_, requests_);
+            }
             break;
         case Page::after:
             note_exam_result(scan_.training);
             draw_after_page(session, player_.notices, screen, ui_, requests_);
             break;
-        case Page::group: draw_class_page(player_, view_.class_page, screen, ui_); break;
+        case Page::group:
+            draw_class_page(player_, view_.class_page, view_.chooser, session.case_open(), screen,
+                            ui_, requests_);
+            break;
     }
     ImGui::End();
     draw_dialogs(session, player_, view_, ui_, requests_);
-    if (screen.show_setup && loaded_.open && screen.page == Page::scan) show_setup(tracker);
     ui_.end();
 }
 
@@ -174,6 +187,11 @@ void PlayerWindow::carry_out(const request::GoOnWithExamSet&) {
 
 void PlayerWindow::carry_out(const request::ChooseTracker& wanted) {
     choose_tracker(player_, loaded_, scan_.tracker, wanted.spec);
+}
+
+void PlayerWindow::carry_out(const request::GoOnWithMouse&) {
+    finish_attempt(player_, loaded_, scan_);
+    choose_tracker(player_, loaded_, scan_.tracker, "mouse");
 }
 
 void PlayerWindow::carry_out(const request::StepTracker& wanted) {

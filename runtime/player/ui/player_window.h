@@ -55,6 +55,7 @@ class PlayerWindow {
     void carry_out(const request::StartExamSet&);
     void carry_out(const request::GoOnWithExamSet&);
     void carry_out(const request::ChooseTracker& wanted);
+    void carry_out(const request::GoOnWithMouse&);
     void carry_out(const request::StepTracker& wanted);
     void carry_out(const request::ToggleNeedle& wanted);
     void carry_out(const request::ChooseModel& wanted);

@@ -45,6 +45,8 @@ struct GoOnWithExamSet {};
 struct ChooseTracker {
     std::string spec;
 };
+// The tracker does not answer: ends an attempt that runs, and takes the mouse.
+struct GoOnWithMouse {};
 struct StepTracker {
     bool back = false;
 };
@@ -103,6 +105,7 @@ using Request = std::variant<request::OpenCase,
                              request::StartExamSet,
                              request::GoOnWithExamSet,
                              request::ChooseTracker,
+                             request::GoOnWithMouse,
                              request::StepTracker,
                              request::ToggleNeedle,
                              request::ChooseModel,

@@ -151,10 +151,6 @@ const char* shape_name(ProbeShape shape) {
     return "";
 }
 
-std::string title_of(const Exercise& exercise) {
-    return exercise.title.empty() ? exercise.name : exercise.title;
-}
-
 void show_top_bar(const SessionView& session,
                   Notices& notices,
                   Screen& screen,
@@ -163,7 +159,7 @@ void show_top_bar(const SessionView& session,
                   Requests& requests) {
     const CaseState& loaded = session.loaded;
     const ScanState& scan = session.scan;
-    const std::string title = title_of(loaded.exercise());
+    const std::string title = loaded.texts().title;
     const std::string server = scan.servers.igtl ? session.serve : "";
     const TopBarRequest request =
         draw_top_bar(ui, bar,
@@ -207,7 +203,9 @@ void show_task(const SessionView& session,
     const ScanState& scan = session.scan;
     const Training& training = scan.training;
     const std::vector<Point3> centres = loaded.target_centres();
+    const ExerciseTexts texts = loaded.texts();
     const TaskCardInput input{.exercise = loaded.exercise(),
+                              .texts = texts,
                               .record = loaded.frame().record,
                               .target_centres = centres,
                               .targets_reached = training.targets_reached,
@@ -361,6 +359,8 @@ void show_image(const SessionView& session,
     input.marks = &view.tools.marks;
     add_names(view.hover, input);
     const ImagePlace place = draw_image_view(ui, area, input);
+    if (place.open_setup) view.screen.show_setup = true;
+    if (place.use_mouse) requests.push_back(request::GoOnWithMouse{});
     // The last hint.
     if (session.scan.training.attempt && shows_targets(session.scan, loaded.exercise()) &&
         loaded.frame().record.tools.has_probe && input.stopped.empty()) {
@@ -400,6 +400,9 @@ void show_view3d(
                                          .path = replay ? scan.replay.tip_path : none,
                                          .best = replay ? scan.replay.best_way : none},
                                         card);
+    // What is not live is not shown as good: grey under a veil.
+    if (!session.live && !scan.console.controls.frozen)
+        ui.fill(card, colour::rgba(0x10, 0x11, 0x12, 190), 8);
     if (swap) screen.swapped = !screen.swapped;
 }
 

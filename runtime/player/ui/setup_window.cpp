@@ -1,17 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The guided set-up (runtime/player/app/setup_guide.h) as a window, with a drawing per step: what
-// is held where, and how it moves.
+// The guided set-up (runtime/player/app/setup_guide.h) as a page: its steps, what is held where and
+// how it moves as a drawing, and how good the readings are so far.
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 
 #include <imgui.h>
 
 #include "runtime/display/theme.h"
+#include "runtime/player/ui/pages.h"
 #include "runtime/player/ui/panels.h"
 #include "runtime/player/ui/parts/icons.h"
+#include "runtime/player/ui/parts/layout.h"
 #include "runtime/player/ui/parts/panel_parts.h"
 #include "runtime/player/words/words.h"
 
@@ -19,12 +22,12 @@ namespace sonocase::runtime::inline player_ui {
 
 namespace {
 
-constexpr float kWide = 300, kHigh = 110;  // u
+constexpr float kWide = 300, kHigh = 110;  // of a drawing, in its own units
 
 struct Pen {
     ImDrawList* draw;
     ImVec2 at;
-    float s;
+    float s;  // pixels of a unit
 
     ImVec2 point(float x, float y) const { return {at.x + x * s, at.y + y * s}; }
     void line(float x0, float y0, float x1, float y1, unsigned packed, float thick = 2) const {
@@ -84,9 +87,13 @@ void draw_sweep_step(const Pen& pen) {
 
 }  // namespace
 
-void draw_setup_drawing(SetupStep step, float s) {
-    const Pen pen{ImGui::GetWindowDrawList(), ImGui::GetCursorScreenPos(), s};
-    pen.draw->AddRectFilled(pen.at, pen.point(kWide, kHigh), colour::kRaised, 6 * s);
+void draw_setup_drawing(Ui& ui, const Box& box, SetupStep step) {
+    ui.fill(box, colour::kRaised, 8);
+    const float fit = std::min(box.w / kWide, box.h / kHigh), s = fit * ui.scale();
+    const Pen pen{ImGui::GetWindowDrawList(),
+                  {(box.x + 0.5f * (box.w - fit * kWide)) * ui.scale(),
+                   (box.y + 0.5f * (box.h - fit * kHigh)) * ui.scale()},
+                  s};
     switch (step) {
         case SetupStep::trackers:
             pen.probe(90, 92, 0, colour::kText);
@@ -122,182 +129,418 @@ void draw_setup_drawing(SetupStep step, float s) {
             pen.arrow(118, 60, 176, 60);
             break;
     }
-    ImGui::Dummy({kWide * s, kHigh * s});
 }
 
 namespace {
 
-constexpr double kStepSeconds = 15;  // that most steps take
-
-// "Polhemus Viper 2": the device by its name, and the number on its socket.
-std::string sensor_name(const std::string& device, int index) {
-    if (index < 0) return tr("none");
-    return (device.empty() ? std::string(tr("Sensor")) : device) + " " + std::to_string(index + 1);
+// printf of a translated format.
+template <class... Values>
+std::string filled(const char* format, Values... values) {
+    char line[160];
+    std::snprintf(line, sizeof line, tr(format), values...);
+    return line;
 }
 
-void sensor_choice(const char* tool,
-                   const std::string& device,
-                   int& index,
-                   const TrackerReading& reading) {
-    ImGui::PushID(tool);
-    ImGui::AlignTextToFramePadding();
-    ImGui::TextUnformatted(tr(tool));
-    ImGui::SameLine(90 * ImGui::GetFontSize() / 14);
-    ImGui::SetNextItemWidth(170 * ImGui::GetFontSize() / 14);
-    if (ImGui::BeginCombo("##sensor", sensor_name(device, index).c_str())) {
-        for (int i = -1; i < std::max(reading.sensor_count, 2); ++i) {
-            if (ImGui::Selectable(sensor_name(device, i).c_str(), i == index)) index = i;
+// What a step's list entry says below its title.
+std::string step_words(const SetupGuide& guide, SetupStep step) {
+    if (guide.found(step)) return tr("found");
+    const bool now = step == guide.step();
+    const double left = setup_seconds(step) - (now ? guide.view().seconds : 0);
+    return now && guide.recording() ? filled("%.0f s to go", std::max(left, 0.0))
+                                    : filled("about %.0f s", setup_seconds(step));
+}
+
+void draw_step_list(Ui& ui, const Box& card, SetupGuide& guide) {
+    ui.card(card, "steps");
+    Box room = card.inset(12);
+    const float high = std::min(56.0f, room.h / kSetupSteps);
+    for (int i = 0; i < kSetupSteps; ++i) {
+        const auto step = static_cast<SetupStep>(i);
+        const bool now = step == guide.step(), found = guide.found(step);
+        Box row = room.take_top(high);
+        ui.begin_in_control();
+        if (now) ui.fill(row.inset(0, 2), colour::kChosen, 6);
+        if (now) ui.fill({row.x, row.y + 8, 3, row.h - 16}, colour::kAccent, 1.5f);
+        const float x = row.x + 22, y = row.y + 0.5f * row.h;
+        if (found) {
+            ui.icon(Icon::pass, x - 12, y - 12, 24, colour::kGood);
+        } else {
+            ui.text({x - 12, y - 12, 24, 24}, std::to_string(i + 1), Type::bold,
+                    now ? colour::kAccent : colour::kDim, Align::centre);
         }
-        ImGui::EndCombo();
+        const Box words{row.x + 42, row.y, row.w - 46, row.h};
+        ui.text({words.x, y - 20, words.w, 20}, tr(setup_title(step)),
+                now ? Type::bold : Type::body, now ? colour::kText : colour::kDim, Align::left,
+                true);
+        ui.text({words.x, y, words.w, 18}, step_words(guide, step), Type::small, colour::kDim,
+                Align::left, true);
+        ui.end_in_control();
+        if (ui.area(setup_title(step), row).clicked) guide.go_to(step);
     }
-    ImGui::SameLine();
-    if (index >= 0 && index < reading.sensor_count) {
-        const SensorReading& s = reading.sensors[index];
-        const Vector3 t = s.world_from_sensor.translation;
-        ImGui::TextDisabled("%8.1f %8.1f %8.1f mm", t.x, t.y, t.z);
-    } else {
-        ImGui::TextDisabled("%s", tr("no readings"));
-    }
-    ImGui::PopID();
 }
 
-void draw_sensors(const TrackerHealth& tracker,
-                  const TrackerReading& reading,
-                  SensorAssignment& assignment,
-                  float s) {
-    ImGui::Text(tr("%s: %s, %.0f readings per second"), tracker.device.c_str(),
-                tr(phase_name(tracker.phase)), tracker.rate_hz);
-    if (!tracker.message.empty()) ImGui::TextWrapped("%s", tr_message(tracker.message).c_str());
-    ImGui::Dummy({0, 4 * s});
-    sensor_choice("Probe", tracker.device, assignment.probe, reading);
-    sensor_choice("Needle", tracker.device, assignment.needle, reading);
+// The steps where there is no room for their names.
+void draw_step_tabs(Ui& ui, const Box& row, SetupGuide& guide) {
+    for (int i = 0; i < kSetupSteps; ++i) {
+        const auto step = static_cast<SetupStep>(i);
+        ButtonStyle style;
+        style.chosen = step == guide.step();
+        style.tip = setup_title(step);
+        if (guide.found(step)) style.icon = Icon::check;
+        if (ui.button(setup_title(step), row.column(i, kSetupSteps, 4),
+                      guide.found(step) ? "" : std::to_string(i + 1), style))
+            guide.go_to(step);
+    }
 }
 
-// True: save.
-bool draw_summary(const Calibrations& calibrations, float s) {
+// Which sensor a tool carries, and where that one is now.
+void draw_sensor(Ui& ui, Box& room, const char* tool, int& index, const SetupPageInput& input) {
+    if (room.h < 44) return;
+    const int count = std::max(input.reading.sensor_count, 2);
+    const std::string name = index < 0 ? tr("none") : filled("Sensor %d", index + 1);
+    const int by = ui.stepper(tool, room.take_top(44, room.h > 70 ? 0 : 8), tr(tool), name,
+                              "Another sensor of the tracker");
+    if (by != 0) index = std::clamp(index + by, -1, count - 1);
+    const bool there = input.live && index >= 0 && index < input.reading.sensor_count &&
+                       input.reading.sensors[index].state != SensorState::absent &&
+                       input.reading.sensors[index].state != SensorState::lost;
+    std::string where = tr("no readings");
+    if (there) {
+        const Vector3 t = input.reading.sensors[index].world_from_sensor.translation;
+        where = filled("%.1f  %.1f  %.1f mm", t.x, t.y, t.z);
+    }
+    ui.text(room.take_top(22, 8), where, Type::small, there ? colour::kText : colour::kDim,
+            Align::right, true);
+}
+
+void draw_tracker_words(Ui& ui, Box& room, const SetupPageInput& input) {
+    const TrackerHealth& tracker = input.tracker;
+    ui.text(room.take_top(22), tracker.device.empty() ? tr("No tracker") : tracker.device,
+            Type::bold, colour::kText, Align::left, true);
+    const std::string state =
+        input.live && tracker.phase == TrackerPhase::streaming
+            ? filled("%.0f readings per second", tracker.rate_hz)
+            : std::string(tr(phase_name(tracker.phase))) + " · " + tr("no readings");
+    ui.text(room.take_top(22, 8), state, Type::small, input.live ? colour::kDim : colour::kWarn,
+            Align::left, true);
+    if (!tracker.message.empty())
+        room.take_top(
+            ui.paragraph(room, tr_message(tracker.message), Type::small, colour::kWarn, true), 8);
+}
+
+// What each tool's calibration is worth, before it is saved.
+void draw_summary(Ui& ui, Box& room, const Calibrations& calibrations) {
     const std::pair<const char*, const std::optional<Calibration>*> tools[] = {
         {"Probe", &calibrations.probe},
         {"Needle", &calibrations.needle},
         {"Mannequin", &calibrations.mannequin}};
     for (const auto& [name, calibration] : tools) {
-        if (*calibration) {
-            ImGui::Text(tr("%s: rms %.2f mm, %d readings"), tr(name), (*calibration)->rms_mm,
-                        (*calibration)->poses);
-        } else {
-            ImGui::TextDisabled(tr("%s: not calibrated"), tr(name));
-        }
-    }
-    ImGui::Dummy({0, 6 * s});
-    return ImGui::Button(tr("Save"), {140 * s, 0});
-}
-
-void draw_recording(SetupGuide& guide, float s) {
-    const SetupView& view = guide.view();
-    const bool on = guide.recording();
-    if (coloured_button(on ? colour::kControlPressed : colour::kPrime, tr(on ? "Stop" : "Record"),
-                        140 * s))
-        guide.record(!on);
-    ImGui::SameLine();
-    if (ImGui::Button(tr("Clear"), {80 * s, 0})) guide.clear_step();
-    ImGui::SameLine();
-    ImGui::TextDisabled(tr("%d readings, %.0f of about %.0f s"), view.readings, view.seconds,
-                        kStepSeconds);
-    if (guide.step() == SetupStep::needle) {
-        ImGui::SameLine();
-        ImGui::TextDisabled(tr("%d depths"), view.recordings);
+        const std::string words = !*calibration ? tr("not calibrated")
+                                  : (*calibration)->rms_mm < 0
+                                      ? tr("not measured")
+                                      : filled("rms %.2f mm", (*calibration)->rms_mm);
+        ui.row(room.take_top(28), tr(name), words, *calibration ? colour::kText : colour::kDim);
     }
 }
 
 // The residuals of the newest readings as a curve, up to 5 mm.
-void draw_course(const std::vector<float>& residuals_mm, float s) {
-    const ImVec2 at = ImGui::GetCursorScreenPos();
-    const ImVec2 size{ImGui::GetContentRegionAvail().x, 70 * s};
+void draw_course(Ui& ui, const Box& box, const std::vector<float>& residuals_mm) {
+    constexpr float kTopMm = 5;
+    ui.fill(box, colour::kRaised, 4);
+    if (residuals_mm.size() < 2) return;
+    std::vector<float> xy;
+    for (std::size_t i = 0; i < residuals_mm.size(); ++i) {
+        xy.push_back(box.x +
+                     box.w * static_cast<float>(i) / static_cast<float>(residuals_mm.size() - 1));
+        xy.push_back(box.y + box.h * (1 - std::clamp(residuals_mm[i] / kTopMm, 0.0f, 1.0f)));
+    }
+    ui.curve(xy, colour::kAccent, 2);
+}
+
+// Fields of the directions that the tool has leaned in; the disc is where it leans now.
+void draw_tilts(Ui& ui, const Box& box, const TiltFields& tilts) {
+    constexpr double kPi = std::numbers::pi;
+    const float x = box.x + 0.5f * box.w, y = box.y + 0.5f * box.h;
+    const float radius = 0.5f * std::min(box.w, box.h);
+    const auto at = [&](double lean_rad) {
+        return radius * static_cast<float>(std::min(lean_rad / TiltFields::kEdgeRad, 1.0));
+    };
     ImDrawList* draw = ImGui::GetWindowDrawList();
-    draw->AddRectFilled(at, {at.x + size.x, at.y + size.y}, colour::kRaised, 4 * s);
-    const float step =
-        residuals_mm.size() > 1 ? size.x / static_cast<float>(residuals_mm.size() - 1) : 0;
-    float x = at.x;
-    for (const float mm : residuals_mm) {
-        draw->PathLineTo({x, at.y + size.y * (1 - std::clamp(mm / 5, 0.0f, 1.0f))});
-        x += step;
-    }
-    draw->PathStroke(colour::kAccent, 0, 2 * s);
-    ImGui::Dummy(size);
+    const float s = ui.scale();
+    const auto field = [&](float inner, float outer, double from, double to, bool leaned) {
+        const auto a0 = static_cast<float>(from + 0.03), a1 = static_cast<float>(to - 0.03);
+        draw->PathArcTo({x * s, y * s}, outer * s, a0, a1, 16);
+        if (inner > 0) draw->PathArcTo({x * s, y * s}, inner * s, a1, a0, 16);
+        if (leaned) {
+            // Rings are not convex: filled as their four corners and the arcs between, in slices.
+            draw->PathClear();
+            constexpr int kSlices = 8;
+            for (int i = 0; i < kSlices; ++i) {
+                const float b0 = a0 + (a1 - a0) * static_cast<float>(i) / kSlices;
+                const float b1 = a0 + (a1 - a0) * static_cast<float>(i + 1) / kSlices;
+                const auto p = [&](float r, float a) {
+                    return ImVec2{(x + r * std::cos(a)) * s, (y + r * std::sin(a)) * s};
+                };
+                draw->AddQuadFilled(p(inner, b0), p(outer, b0), p(outer, b1), p(inner, b1),
+                                    colour::kAccent);
+            }
+        } else {
+            draw->PathStroke(colour::kEdge, ImDrawFlags_Closed, std::max(s, 1.0f));
+        }
+    };
+    const float first = at(TiltFields::kInnerRad), second = at(TiltFields::kOuterRad);
+    field(0, first - 2, -kPi, kPi, tilts.leaned[0]);
+    const auto ring = [&](int count, int from, float inner, float outer) {
+        for (int i = 0; i < count; ++i) {
+            const double a = -kPi + 2 * kPi * i / count;
+            field(inner, outer, a, a + 2 * kPi / count,
+                  tilts.leaned[static_cast<std::size_t>(from + i)]);
+        }
+    };
+    ring(TiltFields::kInner, 1, first, second - 2);
+    ring(TiltFields::kOuter, 1 + TiltFields::kInner, second, radius);
+    const double lean = std::hypot(tilts.x_rad, tilts.y_rad);
+    const auto shown = static_cast<float>(lean > 0 ? at(lean) / lean : 0);
+    ui.disc(x + shown * static_cast<float>(tilts.x_rad),
+            y + shown * static_cast<float>(tilts.y_rad), 5, colour::kText);
 }
 
-void draw_fit(const SetupView& view, float s) {
-    ImGui::TextDisabled("%s", tr("Coverage"));
-    ImGui::SameLine(90 * s);
-    ImGui::ProgressBar(static_cast<float>(view.coverage), {-1, 12 * s}, "");
-    if (view.rms_mm >= 0) {
-        ImGui::TextDisabled("%s", tr("Residual"));
-        ImGui::SameLine(90 * s);
-        ImGui::Text("%.2f mm", view.rms_mm);
-        if (view.sigma_mm >= 0) {
-            ImGui::SameLine();
-            ImGui::TextDisabled(tr("standard deviation %.2f mm"), view.sigma_mm);
-        }
-        if (!view.residuals_mm.empty()) {
-            draw_course(view.residuals_mm, s);
-        }
-    }
-    if (!view.sentence.empty())
-        coloured(view.good_enough ? colour::kGood : colour::kText, view.sentence);
+// The figure that decides in large type, with what it has to reach.
+void draw_figure(Ui& ui, Box& room, SetupStep step, const SetupView& view) {
+    const double needed = setup_needed_mm(step);
+    const bool large = room.h > 200;
+    if (large)
+        ui.text(room.take_top(22),
+                tr(step == SetupStep::mannequin ? "Distance from the skin" : "Uncertainty"),
+                Type::body, colour::kDim, Align::left, true);
+    Box row = room.take_top(large ? 44 : 30, 4);
+    const bool known = view.figure_mm >= 0, reached = known && view.figure_mm < needed;
+    const std::string number = known ? text("%.2f", view.figure_mm) : "–";
+    const Type type = large ? Type::title : Type::heading;
+    const float wide = ui.width(number, type) + 2;
+    ui.text(row.take_left(wide, 6), number, type, known ? colour::kText : colour::kDim);
+    ui.text(row.take_left(ui.width("mm", Type::body) + 2, 12), "mm", Type::body, colour::kDim);
+    if (reached) ui.icon(Icon::pass, row.x, row.y + 0.5f * row.h - 9, 18, colour::kGood);
+    if (reached) row.take_left(24);
+    ui.text(row, filled("needed %.1f mm", needed), Type::small,
+            reached ? colour::kGood : colour::kDim, Align::left, true);
 }
 
-void draw_steps(SetupGuide& guide, float s) {
-    for (int i = 0; i < kSetupSteps; ++i) {
-        const auto step = static_cast<SetupStep>(i);
-        char label[64];
-        std::snprintf(label, sizeof label, "%d  %s", i + 1, tr(setup_title(step)));
-        const ImVec2 at = ImGui::GetCursorScreenPos();
-        if (ImGui::Selectable(label, step == guide.step(), 0, {0, 24 * s})) guide.go_to(step);
-        if (guide.found(step))  // a tick at the end of its row
-            draw_icon(ImGui::GetWindowDrawList(), Icon::check, at.x + 206 * s, at.y + 2 * s, 18 * s,
-                      colour::kGood);
+// How good the readings are so far.
+void draw_measure(Ui& ui, Box room, const SetupGuide& guide) {
+    const SetupView& view = guide.view();
+    const SetupStep step = guide.step();
+    const double expected = setup_seconds(step);
+    if (room.h > 130) {
+        Box time = room.take_bottom(24, 8);
+        const std::string left = filled("%.0f s", std::max(expected - view.seconds, 0.0));
+        ui.text(time.take_right(ui.width("00 s", Type::bold) + 4, 8), left, Type::bold,
+                colour::kText, Align::right);
+        const Box groove{time.x, time.y + 9, time.w, 6};
+        ui.fill(groove, colour::kControlPressed, 3);
+        const auto share = static_cast<float>(std::clamp(view.seconds / expected, 0.0, 1.0));
+        ui.fill({groove.x, groove.y, share * groove.w, groove.h}, colour::kAccent, 3);
     }
+    draw_figure(ui, room, step, view);
+    if (!view.sentence.empty() && room.h > 20)
+        room.take_top(
+            ui.paragraph({room.x, room.y, room.w, std::min(room.h, 60.0f)}, view.sentence,
+                         Type::small, view.good_enough ? colour::kGood : colour::kText, true),
+            8);
+    if (!view.residuals_mm.empty() && room.h > 90) {
+        if (room.h > 130)
+            ui.text(room.take_top(20), filled("Readings disagree by %.2f mm", view.rms_mm),
+                    Type::small, colour::kDim, Align::left, true);
+        draw_course(ui, room.take_top(56, 12), view.residuals_mm);
+    }
+    if (view.tilts && room.h > 110) {
+        Box row = room.take_top(std::min(room.h, 180.0f));
+        draw_tilts(ui, row.take_left(std::min(row.h, 0.6f * row.w), 16), *view.tilts);
+        ui.text(row.take_top(22), tr("Tilts"), Type::bold, colour::kText, Align::left, true);
+        ui.text(row.take_top(26, 4), filled("%d of %d", view.tilts->count(), TiltFields::kCount),
+                Type::bold, colour::kText, Align::left, true);
+        ui.paragraph(row, tr("The dot is the tool: lean it into the empty fields."), Type::small,
+                     colour::kDim, true);
+    } else if (room.h > 30) {
+        ui.row(room.take_top(26),
+               tr(step == SetupStep::needle ? "Depths recorded" : "Movement covered"),
+               step == SetupStep::needle ? filled("%d of %d", view.recordings, 3)
+                                         : filled("%.0f %%", 100 * view.coverage));
+    }
+}
+
+// Starts and ends a recording; at least 44 u high.
+void draw_record(Ui& ui, const Box& box, SetupGuide& guide, bool live) {
+    const bool on = guide.recording();
+    ButtonStyle style;
+    style.icon = on ? Icon::pause : Icon::rec;
+    style.primary = !guide.view().good_enough || on;
+    style.chosen = false;
+    style.enabled = live || on;
+    style.tip = live ? "Takes readings while you move the tool" : "No readings arrive";
+    if (ui.button("record", box, tr(on ? "Stop" : "Record"), style)) guide.record(!on);
+}
+
+void draw_step(Ui& ui, Box room, SetupGuide& guide, const SetupPageInput& input) {
+    const SetupStep step = guide.step();
+    const bool roomy = room.h > 260;
+    if (roomy)
+        ui.text(room.take_top(22), filled("Step %d of %d", static_cast<int>(step) + 1, kSetupSteps),
+                Type::small, colour::kDim);
+    if (roomy)
+        ui.text(room.take_top(38, 4), tr(setup_title(step)),
+                ui.width(tr(setup_title(step)), Type::title) < room.w ? Type::title : Type::heading,
+                colour::kText, Align::left, true);
+    const bool measured = step != SetupStep::trackers && step != SetupStep::done;
+    if (measured && !input.reading.in_mannequin)
+        draw_record(ui, room.take_bottom(48, 8), guide, input.live);
+    const Type type = roomy && room.w > 420 ? Type::heading : Type::small;
+    const char* words = tr(setup_instruction(step));
+    const float high = std::min(ui.paragraph_height(room.w, words, type), room.h);
+    ui.paragraph(room.take_top(high, 12), words, type, colour::kText, true);
+    if (input.reading.in_mannequin) {
+        const Box line = room.take_top(60, 8);
+        ui.icon(Icon::warn, line.x, line.y + 2, 18, colour::kWarn);
+        ui.paragraph({line.x + 26, line.y, line.w - 26, line.h},
+                     tr("The mouse and scripts need no set-up. Choose a tracker that measures "
+                        "first."),
+                     Type::small, colour::kWarn, true);
+    }
+    if (room.h <= 90) return;
+    if (step == SetupStep::done && input.width_px > 0 && !input.picture.empty()) {
+        ui.fill(room, colour::kPicture, 8);
+        const auto wide = static_cast<float>(input.width_px),
+                   high_px = static_cast<float>(input.height_px);
+        const float fit = std::min(room.w / wide, room.h / high_px);
+        const float w = fit * wide, h = fit * high_px;
+        ui.image(input.picture.id(),
+                 {room.x + 0.5f * (room.w - w), room.y + 0.5f * (room.h - h), w, h});
+        return;
+    }
+    draw_setup_drawing(ui, room, step);
+}
+
+// The right column: sensors, what was found, or how good the readings are.
+void draw_side(Ui& ui,
+               Box room,
+               SetupGuide& guide,
+               SensorAssignment& assignment,
+               const SetupPageInput& input) {
+    if (input.reading.in_mannequin) return;
+    switch (guide.step()) {
+        case SetupStep::trackers:
+            draw_tracker_words(ui, room, input);
+            draw_sensor(ui, room, "Probe", assignment.probe, input);
+            draw_sensor(ui, room, "Needle", assignment.needle, input);
+            break;
+        case SetupStep::done: draw_summary(ui, room, input.calibrations); break;
+        default: draw_measure(ui, room, guide);
+    }
+}
+
+// Whether the step's aim is reached, and if not what is missing.
+bool may_go_on(const SetupGuide& guide, const SetupPageInput& input, std::string& why) {
+    const SetupStep step = guide.step();
+    if (input.reading.in_mannequin) {
+        why = "";
+        return false;
+    }
+    if (step == SetupStep::trackers) {
+        if (!input.live) why = tr("Next opens when readings arrive.");
+        return input.live;
+    }
+    if (guide.recording()) why = tr("Stop the recording first.");
+    if (guide.recording()) return false;
+    if (!guide.view().good_enough)
+        why = filled("Next opens when it is known to %.1f mm and has moved enough.",
+                     setup_needed_mm(step));
+    return guide.view().good_enough;
+}
+
+// Back, over again, and on. True: save.
+bool draw_foot(Ui& ui, Box foot, SetupGuide& guide, const SetupPageInput& input) {
+    const SetupStep step = guide.step();
+    const int number = static_cast<int>(step);
+    const bool narrow = foot.w < 720;
+    ButtonStyle style;
+    style.icon = Icon::back;
+    style.enabled = number > 0;
+    style.tip = "The step before";
+    const auto width = [&](const char* words) {
+        return narrow ? 52.0f : 56 + ui.width(words, Type::body);
+    };
+    if (ui.button("before", foot.take_left(width(tr("Back")), 8), narrow ? "" : tr("Back"), style))
+        guide.go_to(static_cast<SetupStep>(number - 1));
+    const bool measured = step != SetupStep::trackers && step != SetupStep::done;
+    style.icon = Icon::again;
+    style.enabled = measured && (guide.view().readings > 0 || guide.view().recordings > 0);
+    style.tip = "Forgets the readings of this step";
+    const char* over = tr("Start this step over");
+    if (ui.button("over", foot.take_left(width(over), 8), narrow ? "" : over, style))
+        guide.clear_step();
+    ButtonStyle next;
+    next.icon = step == SetupStep::done ? Icon::save : Icon::next;
+    std::string why;
+    std::string words;
+    if (step == SetupStep::done) {
+        const Calibrations& c = input.calibrations;
+        next.enabled = c.probe || c.needle || c.mannequin;
+        if (!next.enabled) why = tr("Nothing to save yet");
+        words = tr("Save calibration");
+    } else {
+        next.enabled = may_go_on(guide, input, why);
+        words = std::string(tr("Next"));
+        if (foot.w > 560)
+            words += std::string(": ") + tr(setup_title(static_cast<SetupStep>(number + 1)));
+    }
+    next.primary = next.enabled;
+    const Box box =
+        foot.take_right(std::min(64 + ui.width(words, Type::bold), std::max(foot.w, 60.0f)), 12);
+    const bool pressed = ui.button("next", box, words, next);
+    if (!why.empty() && foot.w > 120) {
+        const float high = std::min(ui.paragraph_height(foot.w, why, Type::small), foot.h);
+        ui.paragraph({foot.x, foot.y + 0.5f * (foot.h - high), foot.w, high}, why, Type::small,
+                     colour::kDim, true);
+    }
+    if (!pressed) return false;
+    if (step == SetupStep::done) return true;
+    guide.next();
+    return false;
 }
 
 }  // namespace
 
-bool draw_setup_window(SetupGuide& guide,
-                       const TrackerHealth& tracker,
-                       const TrackerReading& reading,
-                       const Calibrations& calibrations,
-                       SensorAssignment& assignment,
-                       bool& open,
-                       float s) {
-    bool save = false;
-    if (begin_dialog(tr("Set-up"), open, 760 * s, 520 * s, s)) {
-        const float bottom = -ImGui::GetFrameHeightWithSpacing() - 4 * s;
-        ImGui::BeginChild("steps", {235 * s, bottom}, false, ImGuiWindowFlags_NoBackground);
-        draw_steps(guide, s);
-        ImGui::EndChild();
-        ImGui::SameLine();
-        ImGui::BeginChild("step", {0, bottom}, false, ImGuiWindowFlags_NoBackground);
-        heading(setup_title(guide.step()));
-        draw_setup_drawing(guide.step(), s);
-        ImGui::TextWrapped("%s", tr(setup_instruction(guide.step())));
-        ImGui::Dummy({0, 4 * s});
-        if (reading.in_mannequin) {
-            coloured(colour::kWarn,
-                     tr("The mouse and scripts need no set-up. Choose a tracker that measures "
-                        "first."));
-        } else if (guide.step() == SetupStep::trackers) {
-            draw_sensors(tracker, reading, assignment, s);
-        } else if (guide.step() == SetupStep::done) {
-            save = draw_summary(calibrations, s);
-        } else {
-            draw_recording(guide, s);
-            draw_fit(guide.view(), s);
-        }
-        ImGui::EndChild();
-        ImGui::SetCursorPosX(ImGui::GetWindowWidth() - 112 * s);
-        if (guide.step() != SetupStep::done && ImGui::Button(tr("Next"), {100 * s, 0}))
-            guide.next();
+SetupRequest draw_setup_page(Ui& ui,
+                             Notices& notices,
+                             SetupGuide& guide,
+                             SensorAssignment& assignment,
+                             const SetupPageInput& input) {
+    SetupRequest request;
+    const Box window = ui.window();
+    const PageLayout layout = page_layout(window.w, window.h);
+    Box bar = layout.bar, content = layout.content;
+    request.close =
+        back_button(ui, bar, "scanning", tr("Back to scanning"), "The set-up stays as it is (F3)");
+    if (!show_notice(notices, ui, bar)) ui.text(bar, tr("Set-up"), Type::heading);
+    request.save =
+        draw_foot(ui, content.take_bottom(layout.columns == 1 ? 48 : 56, 12), guide, input);
+    if (layout.columns == 1) {
+        draw_step_tabs(ui, content.take_top(44, 8), guide);
+    } else {
+        draw_step_list(ui, content.take_left(layout.columns > 2 ? 232 : 200, 16), guide);
     }
-    end_dialog();
-    return save;
+    if (content.w > 560) {
+        const Box side = content.take_right(content.w > 800 ? 312 : 0.48f * content.w, 16);
+        ui.card(side, "measure");
+        draw_side(ui, side.inset(16, 12), guide, assignment, input);
+    } else {
+        const Box side = content.take_bottom(0.5f * content.h, 8);
+        ui.card(side, "measure");
+        draw_side(ui, side.inset(16, 12), guide, assignment, input);
+    }
+    ui.card(content, "step");
+    draw_step(ui, content.inset(16, 12), guide, input);
+    return request;
 }
 
 }  // namespace sonocase::runtime::inline player_ui

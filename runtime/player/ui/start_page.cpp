@@ -115,7 +115,7 @@ float draw_case(const Progress& progress,
         ui.fill(picture, colour::kPicture, 6);
         ui.text(picture, tr("Loading"), Type::small, colour::kImageText, Align::centre);
     }
-    const std::string title = card && !card->case_name.empty() ? card->case_name : entry.name;
+    const std::string title = card && !card->title.empty() ? card->title : entry.name;
     ui.text(room.take_top(26), title, Type::heading, colour::kText, Align::left, true);
     char line[160];
     std::snprintf(line, sizeof line, tr("%s · %.1f MB · exercises: %zu"), entry.name.c_str(),
@@ -136,8 +136,8 @@ float draw_case(const Progress& progress,
             requests.push_back(open_exercise(chooser, entry.path, static_cast<int>(i), Then::scan));
         ui.begin_in_control();
         ui.icon(now.icon, row.x + 6, row.y + 16, 20, now.packed);
-        ui.text({row.x + 36, row.y + 4, row.w - 64, 24}, exercise.title, Type::body, colour::kText,
-                Align::left, true);
+        ui.text({row.x + 36, row.y + 4, row.w - 64, 24}, title_of(exercise), Type::body,
+                colour::kText, Align::left, true);
         ui.text({row.x + 36, row.y + 26, row.w - 64, 20}, now.words, Type::small, colour::kDim,
                 Align::left, true);
         ui.icon(Icon::next, row.right() - 24, row.y + 16, 20, colour::kDim);
@@ -180,10 +180,9 @@ void draw_continue(
     ui.text(room.take_top(20), tr("Continue"), Type::small, colour::kDim);
     const auto index =
         std::min(static_cast<std::size_t>(next.exercise), next.card->exercises.size() - 1);
-    ui.text(room.take_top(26), next.card->exercises[index].title, Type::heading, colour::kText,
+    ui.text(room.take_top(26), title_of(next.card->exercises[index]), Type::heading, colour::kText,
             Align::left, true);
-    ui.text(room.take_top(22, 8), next.card->case_name, Type::small, colour::kDim, Align::left,
-            true);
+    ui.text(room.take_top(22, 8), next.card->title, Type::small, colour::kDim, Align::left, true);
     ButtonStyle style;
     style.primary = true;
     style.icon = Icon::live;
@@ -318,9 +317,10 @@ void draw_cases(const Progress& progress,
         if (card && !card->fault.empty()) continue;
         bool found = matches(entry.name, chooser.search);
         if (card) {
-            found = found || matches(card->case_name, chooser.search);
+            found = found || matches(card->case_name, chooser.search) ||
+                    matches(card->title, chooser.search);
             for (const auto& exercise : card->exercises)
-                found = found || matches(exercise.title, chooser.search);
+                found = found || matches(title_of(exercise), chooser.search);
         }
         if (!found) continue;
         // The shortest column takes the next card.

@@ -68,10 +68,10 @@ std::string where_target(const TaskCardInput& input) {
 
 // The last hint asked for; empty: none was.
 std::string hint_words(const TaskCardInput& input) {
-    const int count = static_cast<int>(input.exercise.hints.size());
+    const int count = static_cast<int>(input.texts.hints.size());
     if (input.hints_shown == 0) return "";
     return input.hints_shown > count ? where_target(input)
-                                     : input.exercise.hints[input.hints_shown - 1];
+                                     : input.texts.hints[input.hints_shown - 1];
 }
 
 float hint_height(const Ui& ui, float width, const std::string& words) {
@@ -163,7 +163,7 @@ void draw_values(Ui& ui, Box& room, const TaskCardInput& input) {
 
 // Hints asked for so far, the last one in full; where that does not fit, one line and a button.
 void draw_hints(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
-    const int count = static_cast<int>(input.exercise.hints.size());
+    const int count = static_cast<int>(input.texts.hints.size());
     if (room.h < 44) return;
     const std::string words = hint_words(input);
     const float high = std::min(hint_height(ui, room.w, words), room.h);
@@ -172,8 +172,12 @@ void draw_hints(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& 
     Box head = card.take_top(44);
     ui.icon(Icon::hint, head.x + 10, head.y + 13, 18, colour::kDim);
     char line[64];
-    std::snprintf(line, sizeof line, tr("Hint %d of %d"), std::min(input.hints_shown, count + 1),
-                  count + 1);
+    if (input.hints_shown == 0) {
+        std::snprintf(line, sizeof line, tr("%d hints"), count + 1);
+    } else {
+        std::snprintf(line, sizeof line, tr("Hint %d of %d"),
+                      std::min(input.hints_shown, count + 1), count + 1);
+    }
     if (input.hints_shown <= count) {
         ButtonStyle style;
         style.link = true;
@@ -222,7 +226,7 @@ const char* attempt_words(int difficulty) {
 
 void draw_head(Ui& ui, Box& room, const TaskCardInput& input) {
     const Exercise& exercise = input.exercise;
-    const std::string title = exercise.title.empty() ? exercise.name : exercise.title;
+    const std::string& title = input.texts.title;
     const float line = ui.line_height(Type::heading);
     const float high = std::min(ui.paragraph_height(room.w, title, Type::heading), 2 * line + 1);
     ui.paragraph(room.take_top(high, 4), title, Type::heading, colour::kText, true);
@@ -251,7 +255,7 @@ bool draw_attempt_button(Ui& ui, const Box& box, const TaskCardInput& input) {
     style.primary = true;
     style.key = input.replays ? "P" : "B";
     style.icon = input.replays ? Icon::close : input.attempt ? Icon::check : Icon::live;
-    style.enabled = input.live || input.attempt != nullptr;
+    style.enabled = input.live || input.replays;
     style.tip = input.replays   ? "Back to the result"
                 : input.attempt ? "Ends and scores it"
                                 : "The target gets a new place, and the time starts";
@@ -306,8 +310,8 @@ TaskCardRequest draw_task_card(Ui& ui, const Box& card, const TaskCardInput& inp
     if (input.attempt && !input.exam && room.h > 150) draw_steps(ui, room, input);
     if (input.attempt && input.exam && input.mouse)
         draw_small(ui, room, tr(kAllKeys), kept_free(ui, room.w, input));
-    if (!input.exercise.description.empty()) {
-        const std::string& words = input.exercise.description;
+    const std::string& words = input.texts.description;
+    if (!words.empty()) {
         const float whole = ui.paragraph_height(room.w, words, Type::small);
         const float high =
             std::min(whole, std::max(room.h - 8 - kept_free(ui, room.w, input), 0.0f));

@@ -31,9 +31,10 @@ void sensor_row(const char* tool, const SensorReading* reading, SensorVerdict ve
         ImGui::PushFont(fonts().small);
         ImGui::TextDisabled("  %.1f  %.1f  %.1f mm", t.x, t.y, t.z);
         if (reading->quality >= 0) {
-            ImGui::SameLine(ImGui::GetWindowWidth() - 74 * ImGui::GetFontSize() / 12);
-            ImGui::ProgressBar(reading->quality,
-                               {60 * ImGui::GetFontSize() / 12, ImGui::GetTextLineHeight()}, "");
+            char words[48];
+            std::snprintf(words, sizeof words, tr("quality %.0f %%"), 100.0 * reading->quality);
+            ImGui::SameLine(ImGui::GetWindowContentRegionMax().x - ImGui::CalcTextSize(words).x);
+            ImGui::TextDisabled("%s", words);
         }
         ImGui::PopFont();
     }
@@ -62,11 +63,12 @@ void calibration_row(const char* tool, const std::optional<Calibration>& calibra
 
 // Where a recording or script is, and how fast it runs.
 void draw_pace(PacedTracker& paced) {
-    char text[48];
+    char text[64];
     const double at = paced.at_s(), whole = paced.duration_s();
     std::snprintf(text, sizeof text,
                   tr(paced.speed() == 0 ? "%.1f of %.1f s, still" : "%.1f of %.1f s"), at, whole);
     float place = static_cast<float>(at);
+    small_dim(tr("Place in the recording, and its speed"));
     ImGui::SetNextItemWidth(-1);
     if (ImGui::SliderFloat("##place", &place, 0, static_cast<float>(whole), text)) {
         paced.jump(place - at);
@@ -106,13 +108,22 @@ std::optional<std::string> draw_address(const std::string& spec) {
     static char address[128] = "localhost:18944";
     const std::string prefix = "igtl:";
     small_dim(tr("OpenIGTLink, HOST:PORT"));
-    ImGui::SetNextItemWidth(-110 * ImGui::GetFontSize() / 14);
+    ImGui::SetNextItemWidth(-1);
     const bool entered = ImGui::InputText("##address", address, sizeof address,
                                           ImGuiInputTextFlags_EnterReturnsTrue);
+    const float half = 0.5f * (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x);
+    const bool pressed = ImGui::Button(tr("Connect"), {half, 0});
     ImGui::SameLine();
-    const bool pressed = ImGui::Button(tr("Connect"), {-1, 0});
-    if ((!entered && !pressed) || !address[0] || spec == prefix + address) return {};
-    return prefix + address;
+    // Waits for the sender instead, at the port alone.
+    const bool listens = ImGui::Button(tr("Listen"), {-1, 0});
+    if (ImGui::IsItemHovered())
+        ImGui::SetTooltip("%s", tr("Waits at this port for a sender that connects"));
+    if ((!entered && !pressed && !listens) || !address[0]) return {};
+    const std::string given = address;
+    const std::string wanted =
+        listens ? prefix + "listen:" + given.substr(given.rfind(':') + 1) : prefix + given;
+    if (spec == wanted) return {};
+    return wanted;
 }
 
 void draw_health(const TrackerHealth& health) {
@@ -144,7 +155,6 @@ void draw_calibrations(const Calibrations& calibrations, bool in_mannequin) {
 }  // namespace
 
 std::optional<std::string> draw_tracker_panel(const TrackerPanelInput& input) {
-    heading("Tracker");
     std::optional<std::string> chosen = draw_choice(input.spec, input.sweeps);
     if (const auto address = draw_address(input.spec)) chosen = address;
     if (input.paced) draw_pace(*input.paced);

@@ -78,6 +78,51 @@ const char* from_words(ViewFrom from) {
     return "From outside";
 }
 
+// The orientation cube; a click on a face looks at the patient from there. True: it changed the
+// view.
+bool draw_cube(Ui& ui, View3d& view, const Box& box) {
+    const std::vector<CubeFace> faces = view.cube();
+    if (faces.empty()) return false;
+    ImDrawList* draw = ImGui::GetWindowDrawList();
+    const float s = ui.scale(), half = 0.5f * box.w * s;
+    const ImVec2 middle{(box.x + 0.5f * box.w) * s, (box.y + 0.5f * box.h) * s};
+    const auto at = [&](const std::array<double, 2>& p) {
+        return ImVec2{middle.x + half * static_cast<float>(p[0]),
+                      middle.y - half * static_cast<float>(p[1])};
+    };
+    ButtonStyle style;
+    style.ghost = true;
+    style.tip = "Right, left, front (A), back (P), head, feet; a click looks from there";
+    const bool pressed = ui.button("cube", box, "", style);
+    const CubeFace* under = nullptr;
+    ImFont* font = fonts().bold;
+    for (const CubeFace& face : faces) {
+        const ImVec2 p[] = {at(face.corners[0]), at(face.corners[1]), at(face.corners[2]),
+                            at(face.corners[3])};
+        draw->AddConvexPolyFilled(p, 4, colour::rgba(0x2A, 0x2E, 0x32, 235));
+        draw->AddPolyline(p, 4, colour::kImageText, ImDrawFlags_Closed, std::max(s, 1.0f));
+        if (face.towards_eye > 0.3) {
+            const ImVec2 mid{0.25f * (p[0].x + p[1].x + p[2].x + p[3].x),
+                             0.25f * (p[0].y + p[1].y + p[2].y + p[3].y)};
+            const float size = 0.8f * font->FontSize;
+            const ImVec2 wide = font->CalcTextSizeA(size, 1e9f, 0, face.letter);
+            draw->AddText(font, size, {mid.x - 0.5f * wide.x, mid.y - 0.5f * wide.y}, colour::kText,
+                          face.letter);
+        }
+        // Inside if the pointer is on the same side of all edges.
+        const ImVec2 m = ImGui::GetIO().MousePos;
+        int left = 0;
+        for (int i = 0; i < 4; ++i) {
+            const ImVec2 a = p[i], b = p[(i + 1) % 4];
+            left += (b.x - a.x) * (m.y - a.y) - (b.y - a.y) * (m.x - a.x) > 0;
+        }
+        if (left == 0 || left == 4) under = &face;
+    }
+    if (!pressed || !under) return false;
+    view.look_at(under->outward);
+    return true;
+}
+
 bool view_button(Ui& ui, const char* id, const Box& box, Icon icon, const char* tip) {
     ButtonStyle style;
     style.icon = icon;
@@ -118,6 +163,8 @@ bool draw_view3d_panel(
         view.home();
         view.from() = ViewFrom::outside;
     }
+    if (card.h > 150 && draw_cube(ui, view, {card.x + 6, card.bottom() - 58, 52, 52}))
+        small_view.texture = nullptr;  // drawn anew
     ButtonStyle style;
     style.ghost = true;
     style.left = true;

@@ -6,6 +6,7 @@
 #include <cctype>
 #include <cstdlib>
 
+#include "formats/base/clinical_names.h"
 #include "runtime/player/words/po_text.h"
 
 namespace sonocase::runtime::inline player_words {
@@ -80,51 +81,15 @@ std::string tr_message(const Message& message) {
     return filled_in(other ? *other : message.format(), arguments);
 }
 
-namespace {
-
-std::string readable(std::string words) {
-    for (char& c : words) {
-        if (c == '_') c = ' ';
-    }
-    if (!words.empty())
-        words[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(words[0])));
-    return words;
-}
-
-bool whole_number(std::string_view text) {
-    if (text.empty()) return false;
-    for (const char c : text) {
-        if (!std::isdigit(static_cast<unsigned char>(c))) return false;
-    }
-    return true;
-}
-
-// "a_b_c" without its last part, which is put into `last`; false: there is one part alone.
-bool split_last(std::string& name, std::string& last) {
-    const std::size_t at = name.rfind('_');
-    if (at == std::string::npos || at == 0) return false;
-    last = name.substr(at + 1);
-    name.resize(at);
-    return true;
-}
-
-}  // namespace
-
 std::string tissue_words(const std::string& label) {
-    const std::string english = readable(label);
-    if (language_in_use().catalogue.empty()) return english;
-    if (const char* whole = translation(english.c_str())) return whole;
-    std::string base = label, last, end;
-    if (!split_last(base, last)) return english;
-    if (base == "vertebrae") return std::string(tr("Vertebra")) + " " + last;
-    if (whole_number(last)) {
-        end = " " + last;
-        if (const char* known = translation(readable(base).c_str())) return known + end;
-        if (!split_last(base, last)) return english;
-    }
-    if (last != "left" && last != "right") return english;
-    const char* known = translation(readable(base).c_str());
-    return known ? std::string(known) + " " + tr(last.c_str()) + end : english;
+    if (language_in_use().catalogue.empty()) return clinical_name(label);
+    const LabelParts parts = label_parts(label);
+    const char* known = translation(parts.words.c_str());
+    if (!known) return clinical_name(label);
+    std::string words = known;
+    if (!parts.side.empty()) words += std::string(" ") + tr(parts.side.c_str());
+    if (!parts.number.empty()) words += " " + parts.number;
+    return words;
 }
 
 }  // namespace sonocase::runtime::inline player_words

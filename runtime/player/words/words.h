@@ -47,9 +47,8 @@ const char* tr(const char* english);
 // catalogue lacks stays as it is. Standard error keeps the English.
 std::string tr_message(const Message& message);
 
-// The name of a label as people write it: "kidney_left" is "Kidney left", "Niere links". Sides,
-// numbers of ribs, vertebrae and lesions are put together from parts. A name that the catalogue
-// lacks stays as it is.
+// The name of a label as clinicians write it: "kidney_left" is "Left kidney", "Niere links"
+// (formats/base/clinical_names.h). A name that the catalogue lacks stays English.
 std::string tissue_words(const std::string& label);
 
 }  // namespace sonocase::runtime::inline player_words

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <type_traits>
 
+#include "formats/bundle/body_axes.h"
 #include "formats/bundle/codec/chunk_file.h"
 #include "formats/bundle/stage_files.h"
 #include "formats/files/atomic_file.h"
@@ -391,6 +392,53 @@ TEST(CaseBundle, AFutureVersionSaysSo) {
         << back.error().message();
     EXPECT_NE(back.error().message().find("up to version 1"), std::string::npos)
         << back.error().message();
+}
+
+// A patient with the head towards +y and the right side towards -x, as labels say.
+CaseBundle lying_case(const std::vector<std::pair<std::string, Point3>>& organs) {
+    CaseBundle bundle;
+    bundle.grid.size = {50, 50, 50};
+    bundle.grid.spacing_mm = {4, 4, 4};
+    bundle.labels.push_back({"outside", "air"});
+    std::vector<std::uint8_t> dense(bundle.grid.voxel_count());
+    for (const auto& [name, centre] : organs) {
+        bundle.labels.push_back({name, "tissue"});
+        for (int k = 0; k < 50; ++k)
+            for (int j = 0; j < 50; ++j)
+                for (int i = 0; i < 50; ++i)
+                    if (distance({4.0 * i, 4.0 * j, 4.0 * k}, centre) < 16)
+                        dense[bundle.grid.index(i, j, k)] =
+                            static_cast<std::uint8_t>(bundle.labels.size() - 1);
+    }
+    bundle.label_bricks = bricks_from_dense<std::uint8_t>(dense, bundle.grid.size);
+    return bundle;
+}
+
+TEST(BodyAxes, FollowFromWhereOrgansLie) {
+    const CaseBundle bundle = lying_case({{"urinary_bladder", {100, 30, 100}},
+                                          {"femur_right", {60, 30, 100}},
+                                          {"femur_left", {140, 30, 100}},
+                                          {"liver", {60, 160, 100}},
+                                          {"spleen", {140, 160, 100}}});
+    const BodyAxes axes = body_axes(bundle);
+    ASSERT_TRUE(axes.known);
+    EXPECT_GT(dot(axes.head, Vector3{0, 1, 0}), 0.98);
+    EXPECT_GT(dot(axes.right, Vector3{-1, 0, 0}), 0.98);
+    EXPECT_GT(dot(axes.front, Vector3{0, 0, 1}), 0.98);  // head x right
+    EXPECT_NEAR(axes.groin_mm, 46, 8);
+    EXPECT_EQ(label_at(axes, "iliac_vena_right", {60, 30, 100}), "common_femoral_vein_right");
+    EXPECT_EQ(label_at(axes, "iliac_artery_left", {60, 30, 100}), "common_femoral_artery_left");
+    EXPECT_EQ(label_at(axes, "iliac_vena_right", {60, 90, 100}), "iliac_vena_right");
+    EXPECT_EQ(label_at(axes, "liver", {60, 30, 100}), "liver");
+}
+
+TEST(BodyAxes, AreNotKnownWhereLabelsDoNotSay) {
+    EXPECT_FALSE(body_axes(CaseBundle{}).known);
+    EXPECT_FALSE(body_axes(lying_case({{"liver", {60, 160, 100}}})).known);
+    EXPECT_FALSE(
+        body_axes(lying_case({{"liver", {60, 160, 100}}, {"urinary_bladder", {60, 30, 100}}}))
+            .known);
+    EXPECT_EQ(label_at({}, "iliac_vena_right", {0, 0, 0}), "iliac_vena_right");
 }
 
 }  // namespace

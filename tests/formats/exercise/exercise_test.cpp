@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "formats/base/constants.h"
+#include "formats/exercise/exercise_texts.h"
 
 namespace sonocase {
 namespace {
@@ -209,6 +210,26 @@ TEST(Exercise, ErrorsAreOneLineWhateverTheTextHolds) {
     ASSERT_FALSE(exercise);
     for (const unsigned char c : exercise.error().message()) EXPECT_TRUE(c >= 32 && c != 127);
     EXPECT_EQ((Error{"a\nb\x1b[2J", "c\td", "e\rf"}.message()), "c d: a b [2J; e f");
+}
+
+TEST(Exercise, IsReadInAnotherLanguageWhereItHasThatAndElseInItsOwn) {
+    const std::string text =
+        "name = \"x\"\ntitle = \"Find it\"\ndescription = \"Look.\"\nhints = [\"Left.\", \"Up.\"]\n"
+        "[texts.de]\ntitle = \"Suchen\"\nhints = [\"Links.\", \"Hoch.\"]\n";
+    const auto exercise = parse_exercise(text, "x.toml");
+    ASSERT_TRUE(exercise) << exercise.error().message();
+    const auto texts = parse_exercise_texts(text, "x.toml");
+    ASSERT_TRUE(texts);
+    const ExerciseTexts german = texts_in(*exercise, *texts, "de");
+    EXPECT_EQ(german.title, "Suchen");
+    EXPECT_EQ(german.description, "Look.");
+    EXPECT_EQ(german.hints, (std::vector<std::string>{"Links.", "Hoch."}));
+    EXPECT_EQ(texts_in(*exercise, *texts, "fr").title, "Find it");
+    EXPECT_EQ(texts_in(*exercise, {}, "de").hints, exercise->hints);
+    // As many hints as the exercise has, and nothing that is no text of it.
+    EXPECT_FALSE(parse_exercise(text.substr(0, text.size() - 11) + "]\n", "x.toml"));
+    EXPECT_FALSE(parse_exercise("name = \"x\"\n[texts.de]\ntitel = \"y\"\n", "x.toml"));
+    EXPECT_FALSE(parse_exercise("name = \"x\"\n[texts.german]\ntitle = \"y\"\n", "x.toml"));
 }
 
 }  // namespace

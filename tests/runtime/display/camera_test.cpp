@@ -58,5 +58,48 @@ TEST(Camera, FromOutsideItLooksAtThePointOfInterest) {
     EXPECT_NEAR(middle.z, -500, 1e-9);
 }
 
+TEST(Camera, ThePatientStandsUprightAndIsSeenFromTheSideOfTheProbe) {
+    BodyAxes axes;
+    axes.known = true;
+    axes.right = {-1, 0, 0};
+    axes.head = {0, 1, 0};
+    axes.front = {0, 0, 1};
+    Exercise exercise;
+    exercise.start_probe = {-80, 0, 40};
+    exercise.start_beam = normalized(Vector3{1, 0, -0.4});  // from the right flank
+    const HomeView view = home_view({{-100, -200, -80}, {100, 200, 80}}, exercise, axes);
+    const Rigid camera = mannequin_from_outside_camera(view.home, view.interest, view.orbit);
+    expect_right_handed(camera);
+    const Point3 head = seen(camera, {0, 150, 0}), feet = seen(camera, {0, -150, 0}),
+                 probe = seen(camera, exercise.start_probe), across = seen(camera, {80, 0, -40});
+    EXPECT_GT(head.y, feet.y + 200);
+    EXPECT_NEAR(head.x, feet.x, 1);
+    EXPECT_GT(probe.z, across.z);  // nearer to the eye
+}
+
+TEST(Camera, TheCubeShowsTheSidesThatFaceTheEye) {
+    BodyAxes axes;
+    axes.known = true;
+    sonocase::testing::Random random(5);
+    const Vector3 sides[] = {axes.right,  -axes.right, axes.front,
+                             -axes.front, axes.head,   -axes.head};
+    const Matrix3 home = Matrix3::from_columns(-axes.right, axes.head, axes.front);
+    for (const Vector3& side : sides) {
+        const Rigid camera =
+            mannequin_from_outside_camera(home, {}, orbit_towards(home, side, 500));
+        const auto faces = cube_faces(inverse(camera).rotation, axes);
+        ASSERT_FALSE(faces.empty());
+        EXPECT_GT(dot(faces.back().outward, side), 0.99);  // the nearest one is drawn last
+        EXPECT_GT(faces.back().towards_eye, 0.99);
+    }
+    for (int i = 0; i < 20; ++i) {
+        const auto faces = cube_faces(random.rigid(10).rotation, axes);
+        EXPECT_LE(faces.size(), 3u);
+        for (const CubeFace& face : faces)
+            for (const auto& corner : face.corners)
+                EXPECT_LE(std::max(std::abs(corner[0]), std::abs(corner[1])), 1.0);
+    }
+}
+
 }  // namespace
 }  // namespace sonocase::runtime

@@ -11,7 +11,9 @@
 #include "formats/base/constants.h"
 #include "formats/flow/flow_field.h"
 #include "runtime/imaging/doppler/colour_image.h"
+#include "runtime/imaging/doppler/doppler_view.h"
 #include "runtime/imaging/doppler/ensemble_reference.h"
+#include "support/flowing_case.h"
 
 namespace sonocase::runtime::doppler {
 namespace {
@@ -335,6 +337,39 @@ TEST(ColourImage, TwelveFramesTellArteryFromVein) {
             other.settings.scale_cm_s = 60;
             EXPECT_FALSE(looks_like_an_artery(other)) << radius << " " << angle;
         }
+}
+
+TEST(DopplerView, AimsAtTheVesselThatThePlaneCutsAndAtNoOther) {
+    const CaseBundle bundle = sonocase::testing::flowing_case();
+    Exercise exercise;
+    exercise.probe = testing::linear_probe();
+    const auto view = DopplerView::create(bundle, exercise, {});
+    ASSERT_TRUE(view) << view.error().message();
+    // Across the vessel, which runs along y at z = 25; between two of its nodes, which lie at even
+    // places.
+    FrameInput input;
+    input.mannequin_from_probe = {Matrix3::from_columns({1, 0, 0}, {0, -1, 0}, {0, 0, -1}),
+                                  {-8, 5, 60}};
+    DopplerSettings settings;
+    settings.mode = DopplerMode::spectral;
+    const auto aimed = view->aim(input, settings, true);
+    ASSERT_TRUE(aimed);
+    EXPECT_NEAR(aimed->gate_depth_mm, 35, 0.5);
+    EXPECT_NEAR(aimed->gate_line, 0.5 + 8.0 / 40, 0.03);
+    EXPECT_EQ(std::abs(aimed->angle_deg), 80);  // at right angles; the cursor goes no further
+    EXPECT_LT(aimed->box_left, aimed->gate_line);
+    EXPECT_GT(aimed->box_right, aimed->gate_line);
+    // Along it a steered beam has 70 degrees to the flow.
+    input.mannequin_from_probe.rotation = Matrix3::from_columns({0, 1, 0}, {1, 0, 0}, {0, 0, -1});
+    input.mannequin_from_probe.translation = {1, 0, 60};
+    const auto along = view->aim(input, settings, true);
+    ASSERT_TRUE(along);
+    EXPECT_EQ(std::abs(along->steer_deg), 20);
+    EXPECT_NEAR(std::abs(along->angle_deg), 70, 1.5);
+    // Beside the vessel there is none.
+    input.mannequin_from_probe.translation = {30, 0, 60};
+    EXPECT_FALSE(view->aim(input, settings, true));
+    EXPECT_EQ(view->aimed(input, settings), settings);
 }
 
 }  // namespace

@@ -75,39 +75,11 @@ bool slider(
     return moved;
 }
 
-bool coloured_button(unsigned packed, const char* words, float width) {
-    ImGui::PushStyleColor(ImGuiCol_Button, packed);
-    const bool clicked = ImGui::Button(words, {width, 0});
-    ImGui::PopStyleColor();
-    return clicked;
-}
-
 std::string clock_words(double seconds) {
     char words[32];
     const int whole = static_cast<int>(seconds);
     std::snprintf(words, sizeof words, "%d:%02d", whole / 60, whole % 60);
     return words;
-}
-
-bool begin_dialog(const char* title, bool& open, float width, float height, float scale) {
-    const ImGuiIO& io = ImGui::GetIO();
-    ImGui::SetNextWindowPos({0.5f * io.DisplaySize.x, 0.5f * io.DisplaySize.y}, ImGuiCond_Appearing,
-                            {0.5f, 0.5f});
-    ImGui::SetNextWindowSize(
-        {std::min(width, io.DisplaySize.x - 16), std::min(height, io.DisplaySize.y - 16)},
-        ImGuiCond_Appearing);
-    ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 8 * scale);
-    ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 1);
-    ImGui::PushStyleColor(ImGuiCol_WindowBg, colour::kPanel);
-    ImGui::PushStyleColor(ImGuiCol_TitleBgActive, colour::kRaised);
-    return ImGui::Begin(title, &open,
-                        ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings);
-}
-
-void end_dialog() {
-    ImGui::End();
-    ImGui::PopStyleColor(2);
-    ImGui::PopStyleVar(2);
 }
 
 }  // namespace sonocase::runtime::inline player_ui_parts

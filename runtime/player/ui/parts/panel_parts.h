@@ -25,18 +25,9 @@ void row_distance(const char* name, double mm, double good_mm);
 bool slider(
     const char* name, const char* id, double& value, double low, double high, const char* format);
 
-// A button with a background colour of its own. size: screen pixels; x 0: as wide as the words, -1:
-// the whole width.
-bool coloured_button(unsigned packed, const char* words, float width);
-
 // printf of one number.
 std::string text(const char* format, double value);
 // Minutes and seconds: "1:05".
 std::string clock_words(double seconds);
-
-// A window over the page, first shown in its middle, with a title bar that can close it. True if
-// its content is to be drawn. end_dialog() follows in either case.
-bool begin_dialog(const char* title, bool& open, float width, float height, float scale);
-void end_dialog();
 
 }  // namespace sonocase::runtime::inline player_ui_parts

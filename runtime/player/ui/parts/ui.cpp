@@ -527,6 +527,8 @@ bool Ui::input(const char* id, const Box& box, char* text, std::size_t size, con
     ImGui::PushStyleVar(ImGuiStyleVar_FramePadding,
                         {px(12), std::max(0.5f * (px(box.h) - ImGui::GetFontSize()), 0.0f)});
     ImGui::SetNextItemWidth(px(box.w));
+    // The field of a box that has just opened takes the keyboard.
+    if (layer_ > 0 && ImGui::IsWindowAppearing()) ImGui::SetKeyboardFocusHere();
     const bool done =
         ImGui::InputTextWithHint(id, hint, text, size, ImGuiInputTextFlags_EnterReturnsTrue);
     ImGui::PopStyleVar();

@@ -85,12 +85,17 @@ TEST(ClassRecords, SayWhoStandsWhereAndWhoNeedsHelp) {
                             attempt("A", "liver", true, 3), attempt("B", "liver", false, 15),
                             attempt("A", "kidney", false, 9)});
     EXPECT_EQ(records.trainees, (std::vector<std::string>{"A", "B"}));
-    EXPECT_EQ(records.exercises, (std::vector<std::string>{"kidney", "liver"}));
-    EXPECT_TRUE(records.standing("A", "liver").mastered);
-    EXPECT_EQ(records.standing("B", "liver").attempts, 3);
-    EXPECT_EQ(records.standing("B", "kidney").attempts, 0);
-    EXPECT_EQ(records.curves.at("B"), (std::vector<double>{20, 18, 15}));
-    EXPECT_NE(records.sentence.find("B may need help with liver"), std::string::npos);
+    const ClassExercise kidney{"torso", "kidney"}, liver{"torso", "liver"};
+    EXPECT_EQ(records.exercises, (std::vector<ClassExercise>{kidney, liver}));
+    EXPECT_TRUE(records.standing("A", liver).mastered);
+    EXPECT_EQ(records.standing("B", liver).attempts, 3);
+    EXPECT_EQ(records.standing("B", kidney).attempts, 0);
+    // The same exercise on another case is another one.
+    EXPECT_EQ(records.standing("B", {"other", "liver"}).attempts, 0);
+    EXPECT_EQ(records.curve("B", liver), (std::vector<double>{20, 18, 15}));
+    EXPECT_EQ(records.help.trainee, "B");
+    EXPECT_EQ(records.help.exercise, liver);
+    EXPECT_EQ(records.help.attempts, 3);
 }
 
 // Statements carry what a learning record store requires (xAPI 1.0.3, 4.1): actor, verb, object.

@@ -58,14 +58,14 @@ TEST(Reliability, ComesFromFirstAttemptsAndTheGroupsThatTheEducatorNames) {
     for (const double shift : {0.0, 1.0, 2.0, 30.0}) add("B", "liver", 14 + shift);
     for (const double shift : {0.0, 0.5}) add("E", "liver", 3 + shift);
     add("A", "kidney", 1);
-    const ExerciseReliability found = exercise_reliability(entries, "liver", {"E"});
+    const ExerciseReliability found = exercise_reliability(entries, {"", "liver"}, {"E"});
     EXPECT_EQ(found.trainees, 2);  // E has two attempts only
     EXPECT_NEAR(found.alpha, 1, 1e-12);
     EXPECT_EQ(found.groups.experts, 2);
     EXPECT_EQ(found.groups.novices, 2);  // first attempts: 10 and 14
     EXPECT_GT(found.groups.mark, 3.25);
     EXPECT_LT(found.groups.mark, 12);
-    EXPECT_EQ(exercise_reliability(entries, "spleen", {}).trainees, 0);
+    EXPECT_EQ(exercise_reliability(entries, {"", "spleen"}, {}).trainees, 0);
 }
 
 }  // namespace

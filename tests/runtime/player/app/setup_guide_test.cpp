@@ -156,5 +156,30 @@ TEST(SetupGuide, TakesNoScriptedPoses) {
     EXPECT_EQ(guide.view().readings, 0);
 }
 
+TEST(TiltFields, FillWithTheDirectionsThatATiltedToolHasHad) {
+    const Vector3 tip{0, 0, -100};  // the sensor stands 100 mm above the pin
+    std::vector<Pose> poses;
+    const auto lean = [&](double rad, double turn) {
+        Pose pose;
+        pose.ok = true;
+        pose.tracker_from_tool.rotation = rotation_about({std::cos(turn), std::sin(turn), 0}, rad);
+        poses.push_back(pose);
+    };
+    EXPECT_FALSE(tilt_fields(poses, tip));
+    lean(0, 0);
+    ASSERT_TRUE(tilt_fields(poses, tip));
+    EXPECT_EQ(tilt_fields(poses, tip)->count(), 1);
+    EXPECT_TRUE(tilt_fields(poses, tip)->leaned[0]);
+    for (int i = 0; i < 60; ++i) {
+        lean(0.25, i * 0.10471976);
+        lean(0.5, i * 0.10471976);
+    }
+    EXPECT_EQ(tilt_fields(poses, tip)->count(), TiltFields::kCount);
+    const auto now = tilt_fields(poses, tip);
+    EXPECT_NEAR(std::hypot(now->x_rad, now->y_rad), 0.5, 0.02);
+    // A sensor on the tip shows no lean.
+    EXPECT_FALSE(tilt_fields(poses, {0, 0, 1}));
+}
+
 }  // namespace
 }  // namespace sonocase::runtime

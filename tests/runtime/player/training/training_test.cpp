@@ -189,7 +189,7 @@ TEST(CaseCard, HasNameExercisesAndAPictureOfTheStart) {
     const CaseCard card = make_case_card(path);
     EXPECT_EQ(card.fault, "");
     ASSERT_EQ(card.exercises.size(), 1u);
-    EXPECT_EQ(card.exercises[0].title, "Find the vessel");
+    EXPECT_EQ(title_of(card.exercises[0]), "Find the vessel");
     ASSERT_EQ(card.pixels.size(), static_cast<std::size_t>(card.width_px) * card.height_px);
     double sum = 0;
     for (const std::uint8_t level : card.pixels) sum += level;

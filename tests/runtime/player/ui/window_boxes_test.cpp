@@ -43,10 +43,17 @@ std::vector<SeenBox> load_boxes(const std::string& file) {
     return boxes;
 }
 
-const char* const kPages[] = {"scan",  "attempt",  "frozen",   "after",  "replay",
-                              "help",  "tracker",  "effects",  "cases",  "exercises",
-                              "setup", "colour",   "spectrum", "motion", "named",
-                              "marks", "settings", "notices",  "class",  "sign_in"};
+const char* const kPages[] = {"scan",     "attempt", "frozen", "after",     "replay",   "help",
+                              "tracker",  "effects", "cases",  "exercises", "setup",    "colour",
+                              "spectrum", "motion",  "named",  "marks",     "settings", "notices",
+                              "class",    "sign_in", "longest"};
+
+// The spectral mode with its gain at -30 dB, a number of two digits and a sign.
+std::string longest_values() {
+    std::string keys = "key 3 shift\nwait 2\n";
+    for (int i = 0; i < 30; ++i) keys += "key -\n";
+    return keys;
+}
 
 std::string script(const std::string& folder) {
     const auto shot = [&](const char* name) { return "shot " + folder + "/" + name + ".png\n"; };
@@ -58,10 +65,11 @@ std::string script(const std::string& folder) {
            shot("exercises") + "press in_exam\npress marks\nwait 2\n" + shot("marks") +
            "key escape\nkey f12\nwait 2\nkey f3\nwait 2\n" + shot("setup") + "key f3\nhold u 6\n" +
            shot("named") + "key 2 shift\nwait 6\n" + shot("colour") + "key 3 shift\nwait 6\n" +
-           shot("spectrum") + "key 4 shift\nwait 6\n" + shot("motion") +
-           "key 1 shift\nkey f2\nwait 30\n" + shot("cases") + "press settings\nwait 2\n" +
-           shot("settings") + "press Notices\nwait 2\n" + shot("notices") +
-           "key escape\npress settings\nwait 2\npress Sign in\nwait 2\n" + shot("sign_in") +
+           shot("spectrum") + "key 4 shift\nwait 6\n" + shot("motion") + longest_values() +
+           "wait 2\n" + shot("longest") + "key 1 shift\nkey f2\nwait 30\n" + shot("cases") +
+           "press settings\nwait 2\n" + shot("settings") + "press Notices\nwait 2\n" +
+           shot("notices") + "key escape\npress settings\nwait 2\npress Sign in\nwait 2\n" +
+           shot("sign_in") +
            "key escape\npress settings\nwait 2\npress Class\nwait 4\npress Ann Onymous\nwait 2\n" +
            shot("class") + "quit\n";
 }
@@ -177,6 +185,9 @@ void tour(const std::string& size, double scale, const std::string& language) {
         }
         if (page == std::string("notices")) {
             EXPECT_TRUE(has("close") && !has("Help"));
+        }
+        if (page == std::string("longest") && width_px / used >= 1200) {
+            EXPECT_TRUE(has("-30 dB"));
         }
         if (page == std::string("sign_in")) {
             EXPECT_TRUE(has("sign"));

@@ -174,19 +174,18 @@ TEST_F(WindowMended, TheSetUpShowsTheCourseOfTheResiduals) {
         csv += "\n";
     }
     folder_.write("poses.csv", csv);
-    // Next, Record: both are Dear ImGui's own and stand where the dialog has them at this size.
-    ASSERT_EQ(
-        run("--tracker replay:" + (folder_ / "poses.csv"),
-            "wait 6\nkey f3\nwait 3\nmove 955 595\nwait 1\ndown 0\nup 0\nwait 3\n" + shot("step") +
-                "move 585 346\nwait 1\ndown 0\nup 0\nwait 400\n" + shot("course") + "quit\n")
-            .status,
-        0);
-    // Its curve: pixels of the accent colour below the residual's number.
+    ASSERT_EQ(run("--tracker replay:" + (folder_ / "poses.csv"),
+                  "wait 6\nkey f3\nwait 3\npress next\nwait 3\n" + shot("step") +
+                      "press record\nwait 400\n" + shot("course") + "quit\n")
+                  .status,
+              0);
+    // Its curve: pixels of the accent colour in the upper half of the right column, beside its bar
+    // of time at the bottom and the fields of the tilts.
     const auto accent = [&](const char* name) {
         const Picture picture = load_picture(folder_ / (std::string(name) + ".png"));
         int count = 0;
-        for (int y = 412; y < 484 && picture.width == 1280; ++y) {
-            for (int x = 516; x < 1006; ++x) {
+        for (int y = 150; y < 270 && picture.width == 1280; ++y) {
+            for (int x = 960; x < 1250; ++x) {
                 const std::uint8_t* p = &picture.rgb[3 * (static_cast<std::size_t>(y) * 1280 + x)];
                 count += std::abs(p[0] - 0x82) < 24 && std::abs(p[1] - 0xC8) < 24 &&
                          std::abs(p[2] - 0xE0) < 24;

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <regex>
 
+#include "formats/base/clinical_names.h"
 #include "formats/base/result.h"
 #include "formats/exercise/metric_table.h"
 #include "formats/exercise/needle_makes.h"
@@ -170,12 +171,50 @@ TEST_F(Words, TissueIsNamedWithItsSideAndNumber) {
     EXPECT_EQ(tissue_words("rib_right_7"), "Rippe rechts 7");
     EXPECT_EQ(tissue_words("vertebrae_L3"), "Wirbel L3");
     EXPECT_EQ(tissue_words("metastasis_12"), "Metastase 12");
-    EXPECT_EQ(tissue_words("portal_vein_and_splenic_vein"), "Pfortader und Milzvene");
-    EXPECT_EQ(tissue_words("green_cheese_left"), "Green cheese left");
+    EXPECT_EQ(tissue_words("portal_vein_and_splenic_vein"), "Pfortader oder Milzvene");
+    EXPECT_EQ(tissue_words("common_femoral_vein_right"), "Vena femoralis communis rechts");
+    EXPECT_EQ(tissue_words("green_cheese_left"), "Left green cheese");
     EXPECT_EQ(tissue_words("_"), " ");
     EXPECT_EQ(tissue_words(""), "");
     use_language("en");
-    EXPECT_EQ(tissue_words("portal_vein_left"), "Portal vein left");
+    EXPECT_EQ(tissue_words("portal_vein_left"), "Left portal vein");
+    EXPECT_EQ(tissue_words("rib_right_7"), "Right 7th rib");
+    EXPECT_EQ(tissue_words("rib_left_12"), "Left 12th rib");
+    EXPECT_EQ(tissue_words("vertebrae_L3"), "L3 vertebra");
+    EXPECT_EQ(tissue_words("hepatic_vein_3mm"), "Hepatic vein");
+    EXPECT_EQ(tissue_words("other_muscle_like"), "Muscle and soft tissue");
+    EXPECT_EQ(tissue_words("metastasis_12"), "Metastasis 12");
+}
+
+// Labels of cases, and words of exercises, have a clinician's words in every language.
+TEST_F(Words, EveryClinicalNameIsInTheCatalogue) {
+    for (const ClinicalName& name : clinical_names())
+        EXPECT_NE(translation(std::string(name.words).c_str()), nullptr) << name.words;
+    for (const char* label : {"liver",
+                              "kidney_left",
+                              "iliac_vena_right",
+                              "common_femoral_artery_left",
+                              "gluteus_medius_left",
+                              "autochthon_right",
+                              "rib_left_9",
+                              "costal_cartilages",
+                              "visceral_fat",
+                              "hepatic_artery_1p5mm",
+                              "lung_lower_lobe_right",
+                              "adrenal_gland_left",
+                              "lower calyx",
+                              "spleen metastasis",
+                              "second cyst",
+                              "right vein",
+                              "left vein",
+                              "portal vein",
+                              "artery",
+                              "vein",
+                              "abscess",
+                              "lesion",
+                              "cyst",
+                              "tube"})
+        EXPECT_NE(translation(label_parts(label).words.c_str()), nullptr) << label;
 }
 
 // An error as a tracker and a notice say it.
