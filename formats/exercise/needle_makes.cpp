@@ -10,11 +10,11 @@ namespace {
 // clang-format off
 constexpr std::array kMakes{
     //         name       about                                 mm    rough  lobe  towards away
-    NeedleMake{"chiba", "Chiba needle, bevelled",               0.72, 0.22, 0.119, 0.34, 0.24,
+    NeedleMake{"chiba", "Chiba needle, bevelled",               0.72, 0.0931, 0.1127, 0.2311, 0.1657,
                false, 25, 0.32, 0.75, 0.56},
-    NeedleMake{"trocar", "Trocar needle, three facets",         1.27, 0.15, 0.11, 0.27, 0.19,
+    NeedleMake{"trocar", "Trocar needle, three facets",         1.27, 0.0637, 0.1031, 0.1983, 0.1361,
                false, 24, 0.29, 0.78, 0.59},
-    NeedleMake{"rod", "Polished rod, cut straight",             2.00, 0.076, 0.09, 0.11, 0.04,
+    NeedleMake{"rod", "Polished rod, cut straight",             2.00, 0.0238, 0.0852, 0.0571, 0.0414,
                false, 20, 0.11, 0.30, 0.09},
     NeedleMake{"nitinol", "Nitinol stylet, polished",           2.00, 0.04, 0.097, 0.14, 0.04,
                false, 20, 0.04, 0.39, 0.09},
