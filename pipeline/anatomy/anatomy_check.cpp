@@ -903,8 +903,73 @@ AnatomyReport check_anatomy(const BodySummary& body, const AnatomyOptions& optio
     return Check(body, options).run();
 }
 
-std::optional<double> names_agreement(const BodySummary& body) {
-    return Check(body, {}).agreement();
+namespace {
+
+constexpr double kLongest = 6;          // times half of a structure's usual extent
+constexpr double kOrderMargin_mm = 10;  // structures of one height may lie in either order
+constexpr double kOrderSpread = 3.5;    // standard deviations off the usual distance
+
+// What takes up most of a body: less than this is another structure, ml. The model has no places
+// for them.
+constexpr std::pair<const char*, double> kLeastMl[] = {
+    {"body_trunc", 1000}, {"subcutaneous_fat", 200}, {"torso_fat", 50}, {"skeletal_muscle", 200}};
+
+std::string would_be(const LabelSummary& label) {
+    return std::to_string(label.value) + " would be " + label.name;
+}
+
+// "3 would be spleen to the right of 5, liver" for each pair that lies the other way round.
+void find_orders(const std::vector<std::pair<int, const LabelSummary*>>& known, NamesFit& fit) {
+    const char* beyond[3] = {"to the right of", "in front of", "above"};
+    for (std::size_t i = 0; i < known.size(); ++i)
+        for (std::size_t j = i + 1; j < known.size(); ++j)
+            for (int axis = 0; axis < 3; ++axis) {
+                const ModelStructure &a = torso_model()[static_cast<std::size_t>(known[i].first)],
+                                     &b = torso_model()[static_cast<std::size_t>(known[j].first)];
+                const LabelSummary *first = known[i].second, *second = known[j].second;
+                double usual = a.at[axis] - b.at[axis];
+                if (usual < 0) {
+                    std::swap(first, second);
+                    usual = -usual;
+                }
+                const double wrong = second->centre[axis] - first->centre[axis];
+                if (wrong > kOrderMargin_mm &&
+                    usual + wrong > kOrderSpread * std::hypot(a.spread[axis], b.spread[axis]))
+                    fit.misfits.push_back(would_be(*second) + " " + beyond[axis] + " " +
+                                          std::to_string(first->value) + ", " + first->name);
+            }
+}
+
+}  // namespace
+
+NamesFit names_fit(const BodySummary& body) {
+    NamesFit fit;
+    fit.agreement = Check(body, {}).agreement();
+    std::vector<std::pair<int, const LabelSummary*>> known;
+    std::vector<std::string> volumes;
+    for (const LabelSummary& label : body.labels) {
+        for (const auto& [name, least] : kLeastMl)
+            if (label.name == name && label.ml < least)
+                volumes.push_back(would_be(label) + text(" of %.0f ml", label.ml));
+        const int s = model_structure(label.name);
+        if (s < 0) continue;
+        known.emplace_back(s, &label);
+        const ModelStructure& structure = torso_model()[static_cast<std::size_t>(s)];
+        if (label.ml > structure.max_ml)
+            volumes.push_back(would_be(label) + text(" of %.0f ml", label.ml));
+        else if (label.length_mm > kLongest * structure.half_mm)
+            fit.misfits.push_back(would_be(label) + text(" %.0f mm long", label.length_mm));
+    }
+    fit.gross = !volumes.empty();
+    fit.misfits.insert(fit.misfits.begin(), volumes.begin(), volumes.end());
+    std::stable_sort(known.begin(), known.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+    find_orders(known, fit);
+    return fit;
+}
+
+bool NamesFit::agrees() const {
+    return misfits.empty() && agreement && *agreement > kNamesAgree;
 }
 
 bool is_known_structure(std::string_view name) {

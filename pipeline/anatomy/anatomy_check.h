@@ -35,8 +35,9 @@ struct LabelSummary {
     std::string name;
     int value = 0;  // in the file
     double ml = 0;
-    Point3 centre;                              // mean of its voxels
-    Box3 box;                                   // of its voxel centres
+    Point3 centre;         // mean of its voxels
+    double length_mm = 0;  // of a rod that spreads as far along an axis; 0: not known
+    Box3 box;              // of its voxel centres
     std::array<bool, 3> cut_low{}, cut_high{};  // it reaches the grid's face on that side
 };
 
@@ -96,12 +97,23 @@ struct AnatomyOptions {
 
 AnatomyReport check_anatomy(const BodySummary& body, const AnatomyOptions& options = {});
 
-// How well the names fit the labels: natural logarithm of the density of all places and volumes
-// under the names, against the same labels without names, per known label. Empty with fewer than
-// four labels whose names are known. For choosing among the tables that could name a map: call it
-// once for each. Right names have 6 to 8, a shifted table below 2.
+// How well the names fit the labels, for choosing among the tables that could name a map: call it
+// once for each.
+//
+// agreement  natural logarithm of the density of all places and volumes under the names, against
+//            the same labels without names, per known label; empty with fewer than four labels
+//            whose names are known. Right names have 6 to 8, a shifted table below 2
+// misfits    "8 would be adrenal_gland_right of 91 ml": a volume or a length that no person has,
+//            two structures that lie the other way round than in all but very few people
+struct NamesFit {
+    std::optional<double> agreement;
+    std::vector<std::string> misfits;
+    bool gross = false;  // a volume
+
+    bool agrees() const;  // no misfit, and agreement above kNamesAgree
+};
 inline constexpr double kNamesAgree = 3;
-std::optional<double> names_agreement(const BodySummary& body);
+NamesFit names_fit(const BodySummary& body);
 
 // Whether the model knows a structure of this name, in English, by TotalSegmentator or others.
 bool is_known_structure(std::string_view name);

@@ -124,7 +124,7 @@ double unit_of(std::string_view word) {
 
 // What a column is called: a kind of name, the axis, and the unit that stands in it.
 struct ColumnName {
-    enum Kind { none, plain, t, p, position, ras, lps, normal, status, name };
+    enum Kind { none, plain, t, p, position, ras, lps, normal, status, flag, source, name };
     Kind kind = none;
     int axis = 0;
     double unit_mm = 0;
@@ -156,6 +156,10 @@ ColumnName column_name(std::string_view cell) {
     const std::string& last = words.back();
     if (words.size() == 1) {
         if (is_one_of(last, {"status", "state"})) return {ColumnName::status, 0, 0};
+        if (is_one_of(last, {"valid", "isvalid", "visible", "tracked", "detected"}))
+            return {ColumnName::flag, 0, 0};
+        if (is_one_of(last, {"sensor", "station", "tool", "marker", "device", "probe"}))
+            return {ColumnName::source, 0, 0};
         if (is_one_of(last, {"name", "label", "landmark"})) return {ColumnName::name, 0, 0};
         for (const auto& [letters, kind] :
              {std::pair<const char*, ColumnName::Kind>{"xyz", ColumnName::plain},
@@ -187,6 +191,11 @@ ColumnName column_name(std::string_view cell) {
         return name;
     }
     const std::string& before = words[words.size() - 2];
+    if (words.size() == 2 && before == "is" && is_one_of(last, {"valid", "visible", "tracked"}))
+        return {ColumnName::flag, 0, 0};
+    if (words.size() == 2 && is_one_of(before, {"sensor", "station", "tool", "marker", "device"}) &&
+        is_one_of(last, {"id", "name", "number", "no", "nr", "index", "handle"}))
+        return {ColumnName::source, 0, 0};
     if (const int axis = axis_of(last, "xyz"); axis >= 0) {
         name.axis = axis;
         name.kind = is_position_word(before)             ? ColumnName::position
@@ -210,7 +219,7 @@ struct Columns {
     bool named = false;
     std::array<std::size_t, 3> point{0, 1, 2};
     std::array<int, 3> normal{-1, -1, -1};
-    int status = -1, name = -1;
+    int status = -1, flag = -1, source = -1, name = -1;
     std::size_t count = 0;  // of the line of names
     double unit_mm = 0;
     Axes axes = Axes::unsaid;
@@ -322,6 +331,10 @@ Result<std::optional<Columns>> columns_named(const std::vector<Line>& lines,
     }
     const auto& status = heading.of[ColumnName::status][0];
     if (status.size() == 1) columns.status = static_cast<int>(status[0]);
+    const auto& flag = heading.of[ColumnName::flag][0];
+    if (flag.size() == 1) columns.flag = static_cast<int>(flag[0]);
+    const auto& source = heading.of[ColumnName::source][0];
+    if (source.size() == 1) columns.source = static_cast<int>(source[0]);
     const auto& name = heading.of[ColumnName::name][0];
     if (!name.empty()) columns.name = static_cast<int>(name[0]);
     if (kinds[0] == ColumnName::ras) columns.axes = Axes::ras;
@@ -373,6 +386,11 @@ bool is_ok(std::string_view status) {
     return is_one_of(lower_case(status), {"ok", "valid", "tracked", "good", "visible", "enabled"});
 }
 
+// NDI writes -3.7e28 for what it does not see.
+constexpr double kNowhere = 1e12;
+
+constexpr std::size_t kSensors = 8;  // of one tracker; more are names of rows
+
 // Everything about the lines before the first point.
 struct Layout {
     Columns columns;
@@ -398,6 +416,12 @@ class Parser {
             return Error{"the file says that it holds " + std::to_string(layout_.stated) +
                              " points and holds " + std::to_string(rows_),
                          where_, "it is cut off: export it again"};
+        if (sources_.size() > 1 && sources_.size() <= kSensors && rows_ > 8 * sources_.size() &&
+            !options_.names)
+            return Error{
+                "rows of several sensors in one table: " + sources_[0] + " and " + sources_[1],
+                where_, "keep the rows of the one that touched the surface"};
+        leave_out_zeros(table);
         if (table.points.empty() && table.left_out > 0)
             return Error{
                 "no row has a position" +
@@ -410,6 +434,25 @@ class Parser {
     }
 
   private:
+    // Trackers write 0, 0, 0 for what they do not see; one such row may be a place.
+    void leave_out_zeros(PointTable& table) const {
+        if (at_zero_ < 2) return;
+        std::size_t kept = 0;
+        for (std::size_t n = 0; n < table.points.size(); ++n) {
+            const bool zero = table.points[n] == Point3{0, 0, 0};
+            if (zero && options_.keep_holes) table.points[n] = {kNan, kNan, kNan};
+            if (zero && !options_.keep_holes) continue;
+            table.points[kept] = table.points[n];
+            if (!table.normals.empty()) table.normals[kept] = table.normals[n];
+            if (!table.names.empty()) std::swap(table.names[kept], table.names[n]);
+            ++kept;
+        }
+        table.left_out += table.points.size() - kept;
+        table.points.resize(kept);
+        if (!table.normals.empty()) table.normals.resize(kept);
+        if (!table.names.empty()) table.names.resize(kept);
+    }
+
     std::string place(const Line& line) const { return where_ + ":" + std::to_string(line.number); }
 
     // The separator under which a line has three numbers or more; 0: none.
@@ -545,13 +588,17 @@ class Parser {
                 bad_status_ = cells_[static_cast<std::size_t>(columns.status)].substr(0, 40);
             return false;
         }
+        if (columns.flag >= 0 &&
+            is_one_of(lower_case(cells_[static_cast<std::size_t>(columns.flag)]),
+                      {"0", "0.0", "false", "no", "n", "f"}))
+            return false;
         int holes = 0;
         bool finite = true;
         for (std::size_t axis = 0; axis < 3; ++axis) {
             const std::string_view cell = cells_[columns.point[axis]];
             const auto value = cells_.number(columns.point[axis]);
             point[static_cast<int>(axis)] = value.value_or(kNan);
-            finite = finite && value && std::isfinite(*value);
+            finite = finite && value && std::isfinite(*value) && std::abs(*value) < kNowhere;
             holes += !value && is_hole(cell);
             if (!value && !is_hole(cell)) {
                 for (std::size_t n = 0; n < cells_.size(); ++n)
@@ -570,6 +617,14 @@ class Parser {
 
     void keep(PointTable& table, bool ok, Point3 point) {
         ++rows_;
+        if (ok && point == Point3{0, 0, 0}) ++at_zero_;
+        const int source = layout_.columns.source;
+        if (ok && source >= 0) {
+            const std::string from(cells_[static_cast<std::size_t>(source)]);
+            if (std::find(sources_.begin(), sources_.end(), from) == sources_.end() &&
+                sources_.size() <= kSensors)
+                sources_.push_back(from);
+        }
         if (!ok && !options_.keep_holes) {
             ++table.left_out;
             return;
@@ -700,7 +755,8 @@ class Parser {
     Cells cells_;
     Layout layout_;
     char stated_separator_ = 0;
-    std::size_t rows_ = 0;
+    std::size_t rows_ = 0, at_zero_ = 0;
+    std::vector<std::string> sources_;  // the first few
     std::string bad_status_;
 };
 

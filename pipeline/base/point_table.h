@@ -20,7 +20,7 @@ struct PointTable {
     std::vector<std::string> names;  // # points, or empty
     Axes axes = Axes::unsaid;        // as the file says
     double unit_mm = 0;              // mm per unit as the file says; 0: it does not
-    std::size_t left_out = 0;        // rows without a position, or with a status other than OK
+    std::size_t left_out = 0;  // rows without a position, of several 0, 0, 0, or not OK by status
 };
 
 struct PointTableOptions {
@@ -38,7 +38,10 @@ struct PointTableOptions {
 // Without names, three columns are x, y, z; four whose first is a word are a name and x, y, z; six
 // are x, y, z and unit normals, or x, y, z and colours of whole numbers up to 255.
 //
-// Errors name file and line: text that is not UTF-8; columns whose meaning is not certain, with the
+// Rows that a column status, state, valid or tracked calls bad have no position, nor have those of
+// 0, 0, 0 where there are several, and of numbers beyond 1e12 (NDI).
+//
+// Errors name file and line: text that is not UTF-8; rows of two sensors by a column of that name; columns whose meaning is not certain, with the
 // meanings that are possible and the line to add; rows that do not hold what the others hold; a
 // file that holds fewer points than it says.
 Result<PointTable> parse_point_table(std::string_view text,

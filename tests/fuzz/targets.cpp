@@ -228,8 +228,15 @@ void volume_headers(Bytes bytes) {
     }
     check_placement(pipeline::nrrd_placement(text_of(bytes), "fuzz"));
     check_placement(pipeline::meta_placement(text_of(bytes), "fuzz"));
+    check_error(pipeline::nrrd_voxels(text_of(bytes), "fuzz"));
     const MemoryFile file(bytes);
     check_error(pipeline::read_nifti_volume(file.path(), {}));
+}
+
+void bzip2(Bytes bytes) {
+    const auto unpacked = pipeline::unpack_bzip2(bytes, 0, 100000, "fuzz");
+    check_error(unpacked);
+    if (unpacked) demand(unpacked->size() == 100000);
 }
 
 void label_tables(Bytes bytes) {
@@ -416,6 +423,7 @@ const std::vector<Target>& targets() {
         {"stage_report", stage_report},
         {"nifti_extension", nifti_extension},
         {"volume_headers", volume_headers},
+        {"bzip2", bzip2},
         {"label_tables", label_tables},
         {"dicom_header", dicom_header},
         {"packed_bits", packed_bits},

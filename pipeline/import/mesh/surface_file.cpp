@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <tuple>
 #include <unordered_map>
 #include <vector>
@@ -27,7 +28,8 @@ namespace {
 
 constexpr std::size_t kDensePoints = 60000;  // a cloud of more is reduced
 constexpr double kCubeMm = 5;
-constexpr int kBlock = 10;  // cubes along a block, within which cubes are compared
+constexpr double kFarMm = 5e5;  // 32 bits are good for 0.03 mm there
+constexpr int kBlock = 10;      // cubes along a block, within which cubes are compared
 constexpr std::size_t kFew = 3, kTimesAsMany = 5;
 
 // A key of the cube of this edge that holds p, 21 bits per axis.
@@ -141,7 +143,7 @@ Result<GivenSurface> read_cloud(const std::string& path, StageReport& report) {
     if (table.left_out > 0)
         report.warnings.push_back(
             std::to_string(table.left_out) +
-            " readings without position or with a status other than OK were left out");
+            " readings without position (or 0, 0, 0) or with a status other than OK were left out");
     return GivenSurface{{std::move(table.points), std::move(table.normals), {}},
                         table.axes,
                         table.unit_mm > 0 ? table.unit_mm : 1};
@@ -283,6 +285,15 @@ Result<Surface> import_surface(const std::string& path,
     if (options.torso) reduce_points(surface, &own);
     Box3 box;
     for (const Point3 p : surface.points) box.include(p);
+    double farthest = 0;
+    for (int a = 0; a < 3; ++a)
+        farthest = std::max({farthest, std::abs(box.lower[a]), std::abs(box.upper[a])});
+    if (farthest > kFarMm)
+        own.warnings.push_back(text(
+            "the surface lies %.3g m from the origin of its axes, where numbers of 32 bits are no "
+            "finer than %.2g mm: shift it to the origin (CloudCompare: Global Shift) and export it "
+            "again",
+            farthest / 1000, farthest * std::numeric_limits<float>::epsilon()));
     if (options.torso) {
         // The advice is for the file as it is.
         const double told = glb ? options.scale : mm;

@@ -40,8 +40,8 @@ constexpr DicomTag kImageType = 0x00080008, kSopClass = 0x00080016, kModality = 
                    kFrames = 0x00280008, kRows = 0x00280010, kColumns = 0x00280011,
                    kBits = 0x00280100, kStored = 0x00280101, kHighBit = 0x00280102,
                    kSigned = 0x00280103, kIntercept = 0x00281052, kSlope = 0x00281053,
-                   kTransformation = 0x00289145, kShared = 0x52009229, kPerFrame = 0x52009230,
-                   kSlices = 0x00540081;
+                   kLossy = 0x00282110, kTransformation = 0x00289145, kShared = 0x52009229,
+                   kPerFrame = 0x52009230, kSlices = 0x00540081;
 
 DicomSlice slice_of(const DicomSet& set) {
     DicomSlice slice;
@@ -105,6 +105,10 @@ DicomPixels pixels_of(const DicomHeader& header) {
          {std::pair{kSlope, &pixels.slope}, std::pair{kIntercept, &pixels.intercept}})
         if (const std::string text = text_of(set, tag); !text.empty())
             numbers = numbers && parse_number(text, *value) && std::isfinite(*value);
+    // JPEG of the first two processes knows no other way.
+    pixels.lossy =
+        text_of(set, kLossy) == "01" ||
+        is_one_of(header.transfer_syntax, {"1.2.840.10008.1.2.4.50", "1.2.840.10008.1.2.4.51"});
     pixels.run_lengths = header.packed && header.transfer_syntax == "1.2.840.10008.1.2.5";
     pixels.sound = (pixels.bits == 8 || pixels.bits == 16 || pixels.bits == 32) &&
                    pixels.stored >= 1 && pixels.stored <= pixels.bits &&
@@ -634,6 +638,10 @@ Status read_plain_pixels(const DicomStack& stack, NativeVolume& volume) {
 Result<NativeVolume> read_stack(const DicomStack& stack,
                                 bool resample_shear,
                                 const std::string& path) {
+    for (const DicomSlice& slice : stack.slices)
+        if (slice.pixels.lossy)
+            return Error{"the pixels were compressed with loss (JPEG), which changes label values",
+                         slice.path, "export the labels again, without compression"};
     NativeVolume volume;
     volume.warnings = stack.warnings;
     SONOCASE_TRY(volume.grid, grid_of(stack, path, volume));

@@ -37,6 +37,7 @@ struct DicomPixels {
     std::uint64_t at = 0;
     int bits = 0, stored = 0;
     bool is_signed = false;
+    bool lossy = false;               // packed in a way that changes values
     double slope = 1, intercept = 0;  // value = slope * stored + intercept
 
     bool is_like(const DicomPixels& other) const {

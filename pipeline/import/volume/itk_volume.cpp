@@ -9,6 +9,7 @@
 
 #include <filesystem>
 
+#include "formats/files/atomic_file.h"
 #include "pipeline/base/quiet_library.h"
 #include "pipeline/base/source_checks.h"
 #include "pipeline/base/text.h"
@@ -65,6 +66,42 @@ std::string volume_stem(const std::string& path) {
     return name;
 }
 
+namespace {
+
+bool is_bzip2_nrrd(const std::string& path) {
+    return (has_ending(path, ".nrrd") || has_ending(path, ".nhdr")) && is_bzip2(header_text(path));
+}
+
+std::uint64_t bytes_in(const Placement& placement, const NrrdVoxels& voxels) {
+    std::uint64_t bytes = static_cast<std::uint64_t>(voxels.layers) * bytes_of(voxels.component);
+    for (int axis = 0; axis < 3; ++axis) bytes *= static_cast<std::uint64_t>(placement.size[axis]);
+    return bytes;
+}
+
+// ITK of Debian is built without bzip2.
+Result<NativeVolume> read_bzip2_nrrd(const std::string& path,
+                                     const Placement& placement,
+                                     const VolumeReading& reading) {
+    SONOCASE_TRY(auto voxels, nrrd_voxels(header_text(path), path));
+    NativeVolume volume;
+    SONOCASE_TRY_DONE(place_volume(placement, reading, path, volume));
+    volume.component = voxels.component;
+    volume.layers = voxels.layers;
+    volume.planar = voxels.planar;
+    volume.fields = std::move(voxels.fields);
+    const std::uint64_t bytes = bytes_in(placement, voxels);
+    if (bytes > kMaxVolumeBytes)
+        return Error{"header asks for " + std::to_string(bytes >> 30) + " GB of voxels", path,
+                     "check that the file is complete; export it again"};
+    SONOCASE_TRY_DONE(check_room(volume, bytes, path));
+    SONOCASE_TRY(const auto file, read_file(voxels.data_path));
+    SONOCASE_TRY(volume.bytes, unpack_bzip2(file, voxels.voxels_at, bytes, path));
+    if (voxels.swapped) swap_bytes(volume.bytes, bytes_of(volume.component));
+    return volume;
+}
+
+}  // namespace
+
 VolumeSize size_in_file_header(const std::string& path) {
     if (!check_source_file(path, "") || !check_data_files(path)) return {};
     if (is_nifti_name(path)) {
@@ -79,13 +116,21 @@ VolumeSize size_in_file_header(const std::string& path) {
     }
     const auto placement = placement_in_header(path);
     if (!placement) return {};
+    const Matrix3& steps = placement->columns;
+    if (is_bzip2_nrrd(path)) {
+        const auto voxels = nrrd_voxels(header_text(path), path);
+        if (!voxels) return {};
+        const std::uint64_t bytes = bytes_in(*placement, *voxels);
+        return {bytes / bytes_of(voxels->component),
+                bytes,
+                {norm(steps.column(0)), norm(steps.column(1)), norm(steps.column(2))}};
+    }
     const QuietLibrary quiet;
     itk::Object::GlobalWarningDisplayOff();
     try {
         const itk::ImageIOBase::Pointer io = reader_for(path);
         io->SetFileName(path);
         io->ReadImageInformation();
-        const Matrix3& steps = placement->columns;
         return {static_cast<std::uint64_t>(io->GetImageSizeInPixels()),
                 static_cast<std::uint64_t>(io->GetImageSizeInBytes()),
                 {norm(steps.column(0)), norm(steps.column(1)), norm(steps.column(2))}};
@@ -98,6 +143,7 @@ Result<NativeVolume> read_itk_volume(const std::string& path, const VolumeReadin
     const char* todo = "check that the file is complete; export it again";
     SONOCASE_TRY_DONE(check_data_files(path));
     SONOCASE_TRY(const auto placement, placement_in_header(path));
+    if (is_bzip2_nrrd(path)) return read_bzip2_nrrd(path, placement, reading);
     const QuietLibrary quiet;  // the C libraries below ITK print as well as throw
     itk::Object::GlobalWarningDisplayOff();
     try {

@@ -214,6 +214,55 @@ Result<std::vector<int>> channel_values(const LabelLayers& file,
     return values;
 }
 
+// Sizes and places of the structures, without names.
+BodySummary summary_of(const StructureList& list, double scale) {
+    const Grid& grid = list.grid;
+    const auto x = static_cast<std::uint64_t>(grid.size.x),
+               y = static_cast<std::uint64_t>(grid.size.y);
+    const auto place = [&](const Vector3& v) {
+        return Point3{} + scale * (grid.point_from_voxel({v.x, v.y, v.z}) - Point3{});
+    };
+    BodySummary body;
+    body.voxel_mm = scale * grid.spacing_mm;
+    body.field.include(place({0, 0, 0}));
+    body.field.include(place({grid.size.x - 1.0, grid.size.y - 1.0, grid.size.z - 1.0}));
+    for (const Structure& s : list.structures) {
+        if (s.voxels == 0) continue;
+        Vector3 sum, squares;
+        Box3 box;  // in voxels
+        for (const VoxelRun run : s.runs) {
+            // A run may go on into the rows that follow: its middle is near enough.
+            const std::uint64_t middle = run.first + run.count / 2;
+            const Vector3 at{static_cast<double>(middle % x), static_cast<double>(middle / x % y),
+                             static_cast<double>(middle / (x * y))};
+            sum = sum + run.count * at;
+            squares = squares + run.count * Vector3{at.x * at.x, at.y * at.y, at.z * at.z};
+            const double half = std::min(0.5 * (run.count - 1.0), 0.5 * (grid.size.x - 1.0));
+            box.include(Point3{std::max(0.0, at.x - half), at.y, at.z});
+            box.include(Point3{std::min(grid.size.x - 1.0, at.x + half), at.y, at.z});
+        }
+        LabelSummary one;
+        one.value = s.entry.value;
+        one.ml =
+            static_cast<double>(s.voxels) * grid.voxel_volume_mm3() * std::pow(scale, 3) / 1000;
+        const Vector3 mean = sum / static_cast<double>(s.voxels);
+        one.centre = place(mean);
+        one.box.include(place(box.lower - Point3{}));
+        one.box.include(place(box.upper - Point3{}));
+        for (int axis = 0; axis < 3; ++axis) {
+            const double spread =
+                squares[axis] / static_cast<double>(s.voxels) - mean[axis] * mean[axis];
+            one.length_mm = std::max(one.length_mm,
+                                     std::sqrt(12 * std::max(spread, 0.0)) * body.voxel_mm[axis]);
+            const auto a = static_cast<std::size_t>(axis);
+            one.cut_low[a] = box.lower[axis] < 1;
+            one.cut_high[a] = box.upper[axis] > grid.size[axis] - 2;
+        }
+        body.labels.push_back(one);
+    }
+    return body;
+}
+
 // Names by the number alone, where the file and the tables name none or name others as
 // TotalSegmentator does. Sizes and places must not speak against them.
 Status assume_names(const std::string& path,
@@ -222,62 +271,36 @@ Status assume_names(const std::string& path,
                     StructureList& list) {
     if (options.names == "none" || find_numbering(options.names) != nullptr) return Done{};
     const Numbering& total = numberings().front();
-    std::vector<NumberedStructure> numbered;
     std::string examples;
     int count = 0;
-    Box3 body;
     for (const Structure& s : list.structures) {
-        NumberedStructure one{s.entry.value, 0, {}, 0};
-        Vector3 sum, squares;
-        const auto x = static_cast<std::uint64_t>(list.grid.size.x),
-                   y = static_cast<std::uint64_t>(list.grid.size.y);
-        for (const VoxelRun run : s.runs) {
-            // A run may go on into the rows that follow: its middle is near enough.
-            const std::uint64_t middle = run.first + run.count / 2;
-            const Vector3 at{static_cast<double>(middle % x), static_cast<double>(middle / x % y),
-                             static_cast<double>(middle / (x * y))};
-            sum = sum + run.count * at;
-            squares = squares + run.count * Vector3{at.x * at.x, at.y * at.y, at.z * at.z};
-            body.include(Point3{} + at);
-        }
-        if (s.voxels == 0) continue;
-        const Vector3 mean = sum / static_cast<double>(s.voxels);
-        for (int axis = 0; axis < 3; ++axis) {
-            const double spread =
-                squares[axis] / static_cast<double>(s.voxels) - mean[axis] * mean[axis];
-            one.length_mm = std::max(
-                one.length_mm, std::sqrt(12 * std::max(spread, 0.0)) * list.grid.spacing_mm[axis]);
-        }
-        const double scale = options.scale;
-        one.length_mm *= scale;
-        one.volume_ml = static_cast<double>(s.voxels) * list.grid.voxel_volume_mm3() *
-                        std::pow(scale, 3) / 1000;
-        one.centre_mm =
-            Point3{} + scale * (list.grid.point_from_voxel({mean.x, mean.y, mean.z}) - Point3{});
-        numbered.push_back(one);
         const std::string_view name = total.name(s.entry.value);
-        if (!s.entry.name.empty() || name.empty()) continue;
+        if (s.voxels == 0 || !s.entry.name.empty() || name.empty()) continue;
         if (++count <= 3)
             examples +=
                 (count > 1 ? ", " : "") + std::to_string(s.entry.value) + " " + std::string(name);
     }
     if (count == 0) return Done{};
     if (count > 3) examples += ", ...";
+    const BodySummary body = summary_of(list, options.scale);
+    Box3 box;
+    for (const LabelSummary& label : body.labels) {
+        box.include(label.box.lower);
+        box.include(label.box.upper);
+    }
     // A body of another unit is told of as that: sizes say nothing of names.
-    double length_mm = 0;
-    for (int axis = 0; axis < 3; ++axis)
-        length_mm = std::max(
-            length_mm, (body.extent()[axis] + 1) * options.scale * list.grid.spacing_mm[axis]);
+    const Vector3 extent = box.extent() + body.voxel_mm;
+    const double length_mm = std::max({extent.x, extent.y, extent.z});
     NamesFit fit;
     std::vector<const Numbering*> others;
     if (length_mm >= kMinTorsoMm && length_mm <= kMaxTorsoMm) {
-        fit = names_fit(total, numbered);
-        if (none_named) others = other_numberings(total, numbered);
+        fit = names_fit(named_by(total, body));
+        if (none_named) others = other_numberings(total, body);
     }
     // Of a few organs in an order that few people have, another numbering is the less likely cause.
     constexpr std::size_t kMany = 5;
     const bool refused =
-        fit.gross || (!fit.misfits.empty() && !others.empty() && numbered.size() >= kMany);
+        fit.gross || (!fit.misfits.empty() && !others.empty() && body.labels.size() >= kMany);
     const std::string source =
         none_named ? "neither the file nor a table names its values" : "no table names some values";
     if (refused) {
@@ -297,7 +320,7 @@ Status assume_names(const std::string& path,
         list.warnings.push_back(source + ": they are taken as " + std::string(total.title) + " (" +
                                 examples + "), though " + fit.misfits.front() +
                                 "; give --table or --names none if that is wrong");
-    } else if (fit.passed < 6 || !others.empty()) {
+    } else if (!fit.agrees() || !others.empty()) {
         std::string also;
         if (!others.empty())
             also = ", and would fit " + std::string(others.front()->title) + " as well";

@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "pipeline/anatomy/tissue_table.h"
-#include "pipeline/base/text.h"
 
 namespace sonocase::pipeline::inline import_volume {
 
@@ -138,144 +137,6 @@ std::vector<Numbering> all_numberings() {
     return all;
 }
 
-// Volumes beyond these no patient has, ml: the largest known with a good margin.
-struct Limit {
-    std::string_view name;  // or how the name begins
-    double size;
-};
-constexpr Limit kLargest[] = {
-    {"spleen", 5000},
-    {"kidney_cyst", 3000},
-    {"kidney", 1500},
-    {"gallbladder", 800},
-    {"liver", 6000},
-    {"stomach", 4000},
-    {"pancreas", 400},
-    {"adrenal_gland", 60},
-    {"lung", 6000},
-    {"esophagus", 250},
-    {"trachea", 200},
-    {"thyroid", 300},
-    {"duodenum", 500},
-    {"urinary_bladder", 3000},
-    {"prostate", 500},
-    {"sacrum", 700},
-    {"vertebrae_", 200},
-    {"heart_", 800},
-    {"heart", 2500},
-    {"aorta", 1200},
-    {"pulmonary", 400},
-    {"brachiocephalic", 100},
-    {"subclavian", 100},
-    {"common_carotid", 60},
-    {"superior_vena", 150},
-    {"inferior_vena", 500},
-    {"portal_vein", 250},
-    {"iliac_artery", 250},
-    {"iliac_vena", 250},
-    {"spinal_cord", 250},
-    {"rib_", 120},
-    {"clavicula", 120},
-    {"atrial_appendage", 100},
-};
-
-// Longest sides that no patient's structure has, mm.
-constexpr Limit kLongest[] = {{"vertebrae_", 160},  {"kidney", 230},    {"adrenal_gland", 110},
-                              {"gallbladder", 220}, {"pancreas", 280},  {"duodenum", 300},
-                              {"prostate", 130},    {"heart", 280},     {"thyroid", 160},
-                              {"sacrum", 230},      {"liver", 450},     {"spleen", 400},
-                              {"portal_vein", 280}, {"clavicula", 230}, {"brachiocephalic", 160}};
-
-// What takes up most of a body: less than this is another structure, ml.
-constexpr Limit kSmallest[] = {
-    {"body_trunc", 1000}, {"subcutaneous_fat", 200}, {"torso_fat", 50}, {"skeletal_muscle", 200}};
-
-// `first` lies farther along the axis than `second`: to the right, to the front, to the head.
-struct Order {
-    std::string_view first, second;
-    int axis;
-};
-constexpr Order kOrders[] = {
-    {"liver", "spleen", 0},
-    {"liver", "stomach", 0},
-    {"liver", "kidney_left", 0},
-    {"aorta", "stomach", 0},
-    {"pancreas", "spleen", 0},
-    {"duodenum", "spleen", 0},
-    {"kidney_right", "iliac_artery_left", 2},
-    {"kidney_right", "iliac_artery_right", 2},
-    {"kidney_left", "iliac_vena_left", 2},
-    {"kidney_right", "iliac_vena_right", 2},
-    {"liver", "iliac_artery_left", 2},
-    {"liver", "iliac_artery_right", 2},
-    {"liver", "vertebrae_L4", 2},
-    {"liver", "vertebrae_L5", 2},
-    {"liver", "aorta", 0},
-    {"kidney_right", "kidney_left", 0},
-    {"kidney_right", "spleen", 0},
-    {"gallbladder", "spleen", 0},
-    {"inferior_vena_cava", "aorta", 0},
-    {"adrenal_gland_right", "adrenal_gland_left", 0},
-    {"lung_right", "lung_left", 0},
-    {"lung_upper_lobe_right", "lung_upper_lobe_left", 0},
-    {"lung_lower_lobe_right", "lung_lower_lobe_left", 0},
-    {"liver", "urinary_bladder", 2},
-    {"spleen", "urinary_bladder", 2},
-    {"kidney_right", "urinary_bladder", 2},
-    {"kidney_left", "urinary_bladder", 2},
-    {"aorta", "urinary_bladder", 2},
-    {"liver", "prostate", 2},
-    {"spleen", "prostate", 2},
-    {"kidney_right", "prostate", 2},
-    {"kidney_left", "prostate", 2},
-    {"liver", "sacrum", 2},
-    {"spleen", "sacrum", 2},
-    {"heart", "kidney_right", 2},
-    {"heart", "kidney_left", 2},
-    {"heart", "urinary_bladder", 2},
-    {"trachea", "liver", 2},
-    {"trachea", "kidney_left", 2},
-    {"thyroid_gland", "liver", 2},
-    {"brain", "liver", 2},
-    {"esophagus", "kidney_right", 2},
-    {"esophagus", "kidney_left", 2},
-    {"esophagus", "urinary_bladder", 2},
-    {"lung_left", "kidney_left", 2},
-    {"lung_right", "kidney_right", 2},
-    {"lung_upper_lobe_left", "kidney_left", 2},
-    {"lung_upper_lobe_right", "kidney_right", 2},
-    {"lung_middle_lobe_right", "kidney_right", 2},
-    {"lung_lower_lobe_left", "kidney_left", 2},
-    {"lung_lower_lobe_right", "kidney_right", 2},
-    {"adrenal_gland_right", "urinary_bladder", 2},
-    {"adrenal_gland_left", "urinary_bladder", 2},
-    {"vertebrae_T12", "vertebrae_L1", 2},
-    {"vertebrae_T11", "vertebrae_T12", 2},
-    {"vertebrae_L1", "vertebrae_L2", 2},
-    {"vertebrae_L2", "vertebrae_L3", 2},
-    {"vertebrae_L3", "vertebrae_L4", 2},
-    {"vertebrae_L4", "vertebrae_L5", 2},
-    {"vertebrae_L5", "sacrum", 2},
-    {"liver", "vertebrae_L1", 1},
-    {"stomach", "vertebrae_L1", 1},
-    {"aorta", "vertebrae_L1", 1},
-    {"pancreas", "vertebrae_L1", 1},
-    {"liver", "autochthon_left", 1},
-    {"liver", "autochthon_right", 1},
-    {"urinary_bladder", "sacrum", 1},
-};
-constexpr double kOrderMargin_mm = 10;  // organs of one height may lie in either order
-
-const Limit* row_of(std::span<const Limit> rows, std::string_view name) {
-    for (const Limit& row : rows)
-        if (name.starts_with(row.name)) return &row;
-    return nullptr;
-}
-
-std::string with_name(int value, std::string_view name) {
-    return std::to_string(value) + " would be " + std::string(name);
-}
-
 }  // namespace
 
 std::string_view Numbering::name(int value) const {
@@ -294,92 +155,30 @@ const Numbering* find_numbering(std::string_view key) {
     return nullptr;
 }
 
-NamesFit names_fit(const Numbering& numbering, std::span<const NumberedStructure> structures) {
-    NamesFit fit;
-    for (const NumberedStructure& s : structures) {
-        const std::string_view name = numbering.name(s.value);
-        if (name.empty()) continue;
-        const Limit* largest = row_of(kLargest, name);
-        const Limit* longest = row_of(kLongest, name);
-        const Limit* smallest = row_of(kSmallest, name);
-        if (longest != nullptr && s.length_mm > longest->size) {
-            fit.misfits.push_back(with_name(s.value, name) + text(" %.0f mm long", s.length_mm));
-        }
-        if ((largest == nullptr || s.volume_ml <= largest->size) &&
-            (smallest == nullptr || s.volume_ml >= smallest->size))
-            continue;
-        fit.gross = true;
-        fit.misfits.insert(fit.misfits.begin(),
-                           with_name(s.value, name) + text(" of %.0f ml", s.volume_ml));
-    }
-    const auto find = [&](std::string_view name) -> const NumberedStructure* {
-        for (const NumberedStructure& s : structures)
-            if (numbering.name(s.value) == name) return &s;
-        return nullptr;
-    };
-    const char* beyond[3] = {"to the right of", "in front of", "above"};
-    for (const Order& order : kOrders) {
-        const NumberedStructure *first = find(order.first), *second = find(order.second);
-        if (first == nullptr || second == nullptr) continue;
-        const double ahead = first->centre_mm[order.axis] - second->centre_mm[order.axis];
-        if (ahead > kOrderMargin_mm) ++fit.passed;
-        if (ahead >= -kOrderMargin_mm) continue;
-        fit.misfits.push_back(with_name(second->value, order.second) + " " + beyond[order.axis] +
-                              " " + std::to_string(first->value) + ", " + std::string(order.first));
-    }
-    // Vertebrae of the chest and neck lie above the kidneys, the upper ones above the liver.
-    for (const NumberedStructure& s : structures) {
-        const std::string_view name = numbering.name(s.value);
-        const bool neck = name.starts_with("vertebrae_C");
-        const bool chest = name.size() == 12 && name.starts_with("vertebrae_T");
-        if (!neck && !chest) continue;
-        for (const char* below : {"liver", "kidney_right", "kidney_left", "urinary_bladder"}) {
-            const NumberedStructure* organ = find(below);
-            if (organ == nullptr || (chest && name[11] > '7' && below[0] == 'l')) continue;
-            if (s.centre_mm.z < organ->centre_mm.z - kOrderMargin_mm) {
-                fit.misfits.push_back(with_name(s.value, name) + " below " +
-                                      std::to_string(organ->value) + ", " + below);
-                break;
-            }
-        }
-    }
-    // What is called left lies to the left of the liver, and what is called right not beyond the
-    // spleen.
-    const NumberedStructure *liver = find("liver"), *spleen = find("spleen");
-    for (const NumberedStructure& s : structures) {
-        const std::string_view name = numbering.name(s.value);
-        if (liver != nullptr && name.find("_left") != std::string_view::npos) {
-            if (s.centre_mm.x > liver->centre_mm.x + kOrderMargin_mm)
-                fit.misfits.push_back(with_name(s.value, name) + " to the right of " +
-                                      std::to_string(liver->value) + ", liver");
-        }
-        if (spleen != nullptr && name.find("_right") != std::string_view::npos) {
-            if (s.centre_mm.x < spleen->centre_mm.x - kOrderMargin_mm)
-                fit.misfits.push_back(with_name(s.value, name) + " to the left of " +
-                                      std::to_string(spleen->value) + ", spleen");
-        }
-    }
-    return fit;
+BodySummary named_by(const Numbering& numbering, const BodySummary& body) {
+    BodySummary named = body;
+    for (LabelSummary& label : named.labels) label.name = numbering.name(label.value);
+    return named;
 }
 
-std::vector<const Numbering*> other_numberings(const Numbering& than,
-                                               std::span<const NumberedStructure> structures) {
-    std::vector<std::pair<int, const Numbering*>> fitting;
+std::vector<const Numbering*> other_numberings(const Numbering& than, const BodySummary& body) {
+    std::vector<std::pair<double, const Numbering*>> fitting;
     for (const Numbering& numbering : numberings()) {
-        const bool names_all =
-            std::all_of(structures.begin(), structures.end(),
-                        [&](const auto& s) { return !numbering.name(s.value).empty(); });
-        const bool same = std::all_of(structures.begin(), structures.end(), [&](const auto& s) {
-            return numbering.name(s.value) == than.name(s.value);
+        const auto& labels = body.labels;
+        const bool names_all = std::all_of(labels.begin(), labels.end(), [&](const auto& label) {
+            return !numbering.name(label.value).empty();
+        });
+        const bool same = std::all_of(labels.begin(), labels.end(), [&](const auto& label) {
+            return numbering.name(label.value) == than.name(label.value);
         });
         if (!names_all || same) continue;
-        const NamesFit fit = names_fit(numbering, structures);
-        if (fit.misfits.empty()) fitting.emplace_back(fit.passed, &numbering);
+        const NamesFit fit = names_fit(named_by(numbering, body));
+        if (fit.misfits.empty()) fitting.emplace_back(fit.agreement.value_or(0), &numbering);
     }
     std::stable_sort(fitting.begin(), fitting.end(),
                      [](const auto& a, const auto& b) { return a.first > b.first; });
     std::vector<const Numbering*> others;
-    for (const auto& [passed, numbering] : fitting) others.push_back(numbering);
+    for (const auto& [agreement, numbering] : fitting) others.push_back(numbering);
     return others;
 }
 

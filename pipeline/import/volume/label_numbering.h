@@ -4,12 +4,11 @@
 // them the sizes and places of the structures speak for. Internal to this room.
 #pragma once
 
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "formats/base/geometry.h"
+#include "pipeline/anatomy/anatomy_check.h"
 
 namespace sonocase::pipeline::inline import_volume {
 
@@ -25,27 +24,11 @@ struct Numbering {
 const std::vector<Numbering>& numberings();
 const Numbering* find_numbering(std::string_view key);  // or null
 
-struct NumberedStructure {
-    int value = 0;
-    double volume_ml = 0;
-    Point3 centre_mm;  // RAS+
-    double length_mm =
-        0;  // of a rod that spreads as far along an axis: few stray voxels do no harm
-};
+// The body with the names that a numbering gives to its labels; those that it lacks have none.
+BodySummary named_by(const Numbering& numbering, const BodySummary& body);
 
-// What does not fit the names that a numbering gives. Limits are wide: a child, one kidney, a large
-// spleen, and a map that holds a part of the body are no misfits. A volume that no person has is a
-// gross misfit; a length, or an order of organs, that few have is not.
-struct NamesFit {
-    int passed = 0;                    // comparisons of places that hold
-    bool gross = false;                // a volume
-    std::vector<std::string> misfits;  // "8 would be adrenal_gland_right of 91 ml"
-};
-NamesFit names_fit(const Numbering& numbering, std::span<const NumberedStructure> structures);
-
-// Numberings other than `than` that name every structure and have no misfit, but give at least one
-// of them another name; that of which most comparisons hold comes first.
-std::vector<const Numbering*> other_numberings(const Numbering& than,
-                                               std::span<const NumberedStructure> structures);
+// Numberings other than `than` that name every label and have no misfit (names_fit), but give at
+// least one of them another name; that of the greatest agreement comes first.
+std::vector<const Numbering*> other_numberings(const Numbering& than, const BodySummary& body);
 
 }  // namespace sonocase::pipeline::inline import_volume

@@ -14,6 +14,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "formats/base/result.h"
@@ -91,6 +92,17 @@ Status place_volume(const Placement& placement,
                     const VolumeReading& reading,
                     const std::string& path,
                     NativeVolume& volume);
+
+// Turns round the bytes of numbers of 2, 4 or 8 bytes.
+inline void swap_bytes(std::vector<std::byte>& bytes, std::size_t size) {
+    const auto swap_all = [&]<std::size_t N>(std::integral_constant<std::size_t, N>) {
+        for (std::byte* at = bytes.data(); at + N <= bytes.data() + bytes.size(); at += N)
+            std::reverse(at, at + N);
+    };
+    if (size == 2) swap_all(std::integral_constant<std::size_t, 2>{});
+    if (size == 4) swap_all(std::integral_constant<std::size_t, 4>{});
+    if (size == 8) swap_all(std::integral_constant<std::size_t, 8>{});
+}
 
 inline constexpr std::uint64_t kMaxVolumeBytes = 16ull << 30;  // no patient's volume is larger
 

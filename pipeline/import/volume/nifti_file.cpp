@@ -383,13 +383,6 @@ Error not_there(std::uint64_t position, std::uint64_t needed, const std::string&
             path, kCutOff};
 }
 
-template <class T>
-void swap_all(std::vector<std::byte>& bytes) {
-    for (std::size_t at = 0; at + sizeof(T) <= bytes.size(); at += sizeof(T))
-        std::reverse(bytes.begin() + static_cast<std::ptrdiff_t>(at),
-                     bytes.begin() + static_cast<std::ptrdiff_t>(at + sizeof(T)));
-}
-
 }  // namespace
 
 std::uint64_t NiftiHeader::voxel_bytes() const {
@@ -504,14 +497,7 @@ Result<NativeVolume> read_nifti_volume(const std::string& path, const VolumeRead
     gzerror(file.get(), &status);
     if (status != Z_OK && status != Z_STREAM_END)
         return Error{"damaged compression", path, kCutOff};
-    if (header.swapped) {
-        switch (bytes_of(volume.component)) {
-            case 2: swap_all<std::uint16_t>(volume.bytes); break;
-            case 4: swap_all<std::uint32_t>(volume.bytes); break;
-            case 8: swap_all<std::uint64_t>(volume.bytes); break;
-            default: break;
-        }
-    }
+    if (header.swapped) swap_bytes(volume.bytes, bytes_of(volume.component));
     return volume;
 }
 

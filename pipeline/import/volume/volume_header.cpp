@@ -3,13 +3,16 @@
 #include "pipeline/import/volume/volume_header.h"
 
 #include <algorithm>
+#include <bit>
 #include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <optional>
 #include <vector>
 
+#include <bzlib.h>
 #include <zlib.h>
 
 #include "formats/files/atomic_file.h"
@@ -305,6 +308,19 @@ std::vector<std::vector<std::string>> vectors_in(std::string_view text) {
     }
 }
 
+// "\"mm\" \"\"  \"mm\"": what stands between quotation marks.
+std::vector<std::string> quoted_words(std::string_view text) {
+    std::vector<std::string> words;
+    while (true) {
+        const std::size_t open = text.find('"');
+        if (open == std::string_view::npos) return words;
+        const std::size_t close = text.find('"', open + 1);
+        if (close == std::string_view::npos) return words;
+        words.emplace_back(text.substr(open + 1, close - open - 1));
+        text.remove_prefix(close + 1);
+    }
+}
+
 // The fields of an NRRD header, without blanks and in lower case: "spacedirections".
 std::map<std::string, std::string> nrrd_fields(std::string_view header) {
     std::map<std::string, std::string> fields;
@@ -323,6 +339,43 @@ std::map<std::string, std::string> nrrd_fields(std::string_view header) {
     return fields;
 }
 
+// "rai": from right to left, from anterior, from inferior. Columns in MetaImage's axes (x to the
+// left, y to the back). Empty for anything else.
+std::optional<Matrix3> axes_of_letters(const std::string& letters) {
+    constexpr std::string_view kFrom[3] = {"rl", "ap", "is"};
+    if (letters.size() != 3) return std::nullopt;
+    Matrix3 axes = Matrix3::diagonal({0, 0, 0});
+    bool taken[3] = {false, false, false};
+    for (int axis = 0; axis < 3; ++axis)
+        for (int row = 0; row < 3; ++row) {
+            const std::size_t side = kFrom[row].find(letters[static_cast<std::size_t>(axis)]);
+            if (side == std::string_view::npos || taken[row]) continue;
+            taken[row] = true;
+            axes(row, axis) = side == 0 ? 1 : -1;
+        }
+    if (!taken[0] || !taken[1] || !taken[2]) return std::nullopt;
+    return axes;
+}
+
+// The letters of columns in RAS+.
+std::string letters_of_axes(const Matrix3& columns) {
+    constexpr std::string_view kFrom[3] = {"rl", "ap", "is"};
+    std::string letters;
+    for (int axis = 0; axis < 3; ++axis) {
+        int most = 0;
+        for (int row = 1; row < 3; ++row)
+            if (std::abs(columns(row, axis)) > std::abs(columns(most, axis))) most = row;
+        const bool along = (most == 2) == (columns(most, axis) > 0);  // of MetaImage's own axes
+        letters += kFrom[most][along ? 0 : 1];
+    }
+    return letters;
+}
+
+std::string upper_case(std::string text) {
+    for (char& c : text) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    return text;
+}
+
 bool is_nothing(const std::vector<std::string>& cells) {
     return std::all_of(cells.begin(), cells.end(), [](const std::string& cell) {
         const auto number = number_in(cell);
@@ -338,10 +391,6 @@ Result<Placement> nrrd_placement(std::string_view header, const std::string& pat
         const auto found = fields.find(key);
         return found == fields.end() ? std::string() : found->second;
     };
-    const std::string encoding = lower_case(field("encoding"));
-    if (encoding == "bzip2" || encoding == "bz2")
-        return Error{"its voxels are packed with bzip2", path,
-                     "save it with gzip or without compression"};
     SONOCASE_TRY(const auto sizes, finite_numbers(words_of(field("sizes")), 0, "sizes", path));
     SONOCASE_TRY_DONE(check_sizes(sizes, "sizes", path));
     const auto vectors = vectors_in(field("spacedirections"));
@@ -367,12 +416,14 @@ Result<Placement> nrrd_placement(std::string_view header, const std::string& pat
                      "expected three dimensions; export one time step"};
 
     Placement placement;
-    std::vector<double> spacings;
+    std::vector<double> spacings;  // of the axes that have one
     const std::vector<std::string> spacing_cells = words_of(field("spacings"));
     for (std::size_t n = 0; n < 3; ++n) {
         const std::size_t axis = spatial[n];
         placement.size[static_cast<int>(n)] = static_cast<std::int32_t>(sizes[axis]);
         if (axis >= spacing_cells.size()) continue;
+        // Beside directions NaN means that it is not given.
+        if (!vectors.empty() && is_nothing({spacing_cells[axis]})) continue;
         SONOCASE_TRY(const auto one, finite_numbers({spacing_cells[axis]}, 1, "spacings", path));
         if (!(one[0] > 0))
             return Error{text("spacings of the header holds %g", one[0]), path,
@@ -406,7 +457,7 @@ Result<Placement> nrrd_placement(std::string_view header, const std::string& pat
         if (!known_space)
             placement.warnings.push_back(
                 text(kNoOrientation, space.empty() ? "no space" : ("space " + space).c_str()));
-        for (std::size_t n = 0; n < spacings.size(); ++n) {
+        for (std::size_t n = 0; n < 3 && spacings.size() == 3; ++n) {
             const double length = norm(placement.columns.column(static_cast<int>(n)));
             if (std::abs(length - spacings[n]) * sizes[spatial[n]] > 0.5 * length)
                 placement.warnings.push_back(
@@ -415,17 +466,39 @@ Result<Placement> nrrd_placement(std::string_view header, const std::string& pat
                          length, spatial[n] + 1, spacings[n]));
         }
     } else {
-        const bool sized = spacings.size() == 3;
-        const std::vector<std::string> minima = words_of(field("axismins"));
+        bool sized = spacings.size() == 3;
+        const std::vector<std::string> minima = words_of(field("axismins")),
+                                       maxima = words_of(field("axismaxs"));
+        const std::vector<std::string> centres = words_of(
+            lower_case(field("centerings").empty() ? field("centers") : field("centerings")));
+        std::vector<double> first(3, 0.0), steps;  // of the middles of voxels
+        for (std::size_t n = 0; n < 3; ++n) {
+            const std::size_t axis = spatial[n];
+            const bool node = axis < centres.size() && centres[axis] == "node";
+            const auto bound = [&](const std::vector<std::string>& cells) {
+                const auto value = axis < cells.size() ? number_in(cells[axis]) : std::nullopt;
+                return value && std::isfinite(*value) ? value : std::nullopt;
+            };
+            const auto least = bound(minima), most = bound(maxima);
+            if (least && most && *most > *least && (sizes[axis] > 1 || !node))
+                steps.push_back((*most - *least) / (sizes[axis] - node));
+            if (least) first[n] = *least;
+            if (least && !node && steps.size() == n + 1) first[n] += steps[n] / 2;
+        }
+        if (!sized && steps.size() == 3) {
+            spacings = steps;
+            sized = true;
+            placement.warnings.push_back(
+                text("the header gives no spacings: voxels of %.4g x %.4g x %.4g mm are taken from "
+                     "axis mins and axis maxs",
+                     steps[0], steps[1], steps[2]));
+        }
         for (int axis = 0; axis < 3; ++axis) {
             const auto n = static_cast<std::size_t>(axis);
             for (int row = 0; row < 3; ++row)
                 placement.columns(row, axis) =
                     row == axis ? (axis < 2 ? -1 : 1) * (sized ? spacings[n] : 1) : 0;
-            if (spatial[n] >= minima.size()) continue;
-            const auto least = number_in(minima[spatial[n]]);
-            if (least && std::isfinite(*least))
-                placement.origin_mm[axis] = (axis < 2 ? -1 : 1) * *least;
+            placement.origin_mm[axis] = (axis < 2 ? -1 : 1) * first[n];
         }
         placement.warnings.push_back(text(kNoOrientation, "no space directions"));
         if (!sized)
@@ -434,12 +507,20 @@ Result<Placement> nrrd_placement(std::string_view header, const std::string& pat
                 "write the file again with it, or give --scale");
     }
     // A quoted unit per axis of space: all must be the same one.
-    const std::vector<std::string> units = words_of(field("spaceunits"));
+    std::vector<std::string> units = words_of(field("spaceunits"));
+    const char* units_field = "space units";
+    if (vectors.empty()) {  // then each axis of the array may have its own
+        units_field = "units";
+        const std::vector<std::string> of_axes = quoted_words(field("units"));
+        for (const std::size_t axis : spatial)
+            if (axis < of_axes.size()) units.push_back(of_axes[axis]);
+    }
     if (!units.empty()) {
         for (const std::string& unit : units)
             if (unit_in_mm(unit) != unit_in_mm(units[0]))
-                return Error{"space units of the header differ between axes", path, kWriteAgain};
-        SONOCASE_TRY_DONE(scale_to_mm(units[0], "space units", path, placement));
+                return Error{std::string(units_field) + " of the header differ between axes", path,
+                             kWriteAgain};
+        SONOCASE_TRY_DONE(scale_to_mm(units[0], units_field, path, placement));
     }
     if (!is_finite(placement)) return not_finite("axes or origin", path);
     return placement;
@@ -479,6 +560,7 @@ Result<Placement> meta_placement(std::string_view header, const std::string& pat
     const auto [spacing_name, spacing_text] = field({"ElementSpacing", "ElementSize"});
     const auto [origin_name, origin_text] = field({"Offset", "Position", "Origin"});
     const auto [matrix_name, matrix_text] = field({"TransformMatrix", "Rotation", "Orientation"});
+    const std::string letters = lower_case(field({"AnatomicalOrientation"}).second);
     std::vector<double> spacing(dimensions, 1.0), origin(dimensions, 0.0), matrix;
     if (!spacing_name.empty()) {
         SONOCASE_TRY(spacing,
@@ -498,8 +580,32 @@ Result<Placement> meta_placement(std::string_view header, const std::string& pat
     if (!matrix_name.empty()) {
         SONOCASE_TRY(matrix, finite_numbers(words_of(matrix_text), dimensions * dimensions,
                                             matrix_name, path));
+    } else if (const auto axes = axes_of_letters(letters)) {
+        matrix.assign(dimensions * dimensions, 0);
+        for (std::size_t a = 0; a < dimensions; ++a)
+            for (std::size_t row = 0; row < dimensions; ++row)
+                matrix[a * dimensions + row] =
+                    a < 3 && row < 3 ? (*axes)(static_cast<int>(row), static_cast<int>(a))
+                                     : a == row;
+        placement.warnings.push_back(
+            "the header has no TransformMatrix: its axes are taken from AnatomicalOrientation (" +
+            field({"AnatomicalOrientation"}).second +
+            ", the sides that they run from); check on which side the liver is");
     } else {
         placement.warnings.push_back(text(kNoOrientation, "no TransformMatrix"));
+    }
+    if (const std::string size_text = field({"ElementSize"}).second;
+        spacing_name == "ElementSpacing" && !size_text.empty()) {
+        SONOCASE_TRY(const auto element,
+                     finite_numbers(words_of(size_text), dimensions, "ElementSize", path));
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            if (std::abs(element[axis] - spacing[axis]) * sizes[axis] > 0.5 * spacing[axis]) {
+                placement.warnings.push_back(text(
+                    "voxels lie %g x %g x %g mm apart by ElementSpacing and are %g x %g x %g mm "
+                    "large by ElementSize: the spacing is taken",
+                    spacing[0], spacing[1], spacing[2], element[0], element[1], element[2]));
+                break;
+            }
     }
     for (int axis = 0; axis < 3; ++axis) {
         const auto a = static_cast<std::size_t>(axis);
@@ -516,13 +622,21 @@ Result<Placement> meta_placement(std::string_view header, const std::string& pat
                          path, "write directions of length 1, and sizes in ElementSpacing"};
         for (int row = 0; row < 3; ++row) placement.columns(row, axis) = spacing[a] * along[row];
     }
+    if (const auto axes = axes_of_letters(letters); axes && !matrix_name.empty()) {
+        const std::string by_matrix = letters_of_axes(placement.columns);
+        if (by_matrix != letters)
+            placement.warnings.push_back("AnatomicalOrientation says " +
+                                         field({"AnatomicalOrientation"}).second + " and " +
+                                         matrix_name + " " + upper_case(by_matrix) +
+                                         ": the matrix is taken; check on which side the liver is");
+    }
     SONOCASE_TRY_DONE(
         scale_to_mm(field({"DistanceUnits"}).second, "DistanceUnits", path, placement));
     if (!is_finite(placement)) return not_finite("axes or origin", path);
     return placement;
 }
 
-Result<Placement> placement_in_header(const std::string& path) {
+std::string header_text(const std::string& path) {
     constexpr std::size_t kMaxHeader = 16 << 20;
     const bool meta = has_ending(path, ".mha") || has_ending(path, ".mhd");
     std::ifstream file(path, std::ios::binary);
@@ -532,8 +646,185 @@ Result<Placement> placement_in_header(const std::string& path) {
         if (meta ? lower_case(trimmed(line)).starts_with("elementdatafile") : trimmed(line).empty())
             break;
     }
+    return header;
+}
+
+Result<Placement> placement_in_header(const std::string& path) {
+    const bool meta = has_ending(path, ".mha") || has_ending(path, ".mhd");
+    const std::string header = header_text(path);
     return meta ? meta_placement(header, path) : nrrd_placement(header, path);
 }
+
+namespace {
+
+std::optional<Component> component_named(std::string type) {
+    std::erase(type, ' ');
+    for (const char* ending : {"_t", "int"})
+        if (type.ends_with(ending) && type.size() > std::string_view(ending).size() &&
+            type != "uint" && type != "signedint" && type != "unsignedint")
+            type.resize(type.size() - std::string_view(ending).size());
+    const std::pair<Component, std::initializer_list<std::string_view>> kNames[] = {
+        {Component::u8, {"uchar", "unsignedchar", "uint8"}},
+        {Component::i8, {"signedchar", "int8"}},
+        {Component::u16, {"ushort", "unsignedshort", "uint16"}},
+        {Component::i16, {"short", "signedshort", "int16"}},
+        {Component::u32, {"uint", "unsignedint", "uint32"}},
+        {Component::i32, {"int", "signedint", "int32"}},
+        {Component::u64, {"ulonglong", "unsignedlonglong", "uint64"}},
+        {Component::i64, {"longlong", "signedlonglong", "int64"}},
+        {Component::f32, {"float"}},
+        {Component::f64, {"double"}}};
+    for (const auto& [component, names] : kNames)
+        if (std::find(names.begin(), names.end(), type) != names.end()) return component;
+    return std::nullopt;
+}
+
+// A value of the writer's own, in which "\\n" stands for the end of a line.
+std::string without_escapes(std::string_view text) {
+    std::string out;
+    for (std::size_t at = 0; at < text.size(); ++at) {
+        const bool escaped = text[at] == '\\' && at + 1 < text.size();
+        if (escaped) ++at;
+        out += escaped && text[at] == 'n' ? '\n' : text[at];
+    }
+    return out;
+}
+
+}  // namespace
+
+bool is_bzip2(std::string_view nrrd_header) {
+    const auto fields = nrrd_fields(nrrd_header);
+    const auto found = fields.find("encoding");
+    if (found == fields.end()) return false;
+    const std::string encoding = lower_case(found->second);
+    return encoding == "bzip2" || encoding == "bz2";
+}
+
+Result<NrrdVoxels> nrrd_voxels(std::string_view header, const std::string& path) {
+    NrrdVoxels voxels;
+    const auto fields = nrrd_fields(header);
+    const auto field = [&](const char* key) {
+        const auto found = fields.find(key);
+        return found == fields.end() ? std::string() : found->second;
+    };
+    const auto component = component_named(lower_case(field("type")));
+    if (!component) return Error{"voxels of type " + field("type"), path, "expected whole numbers"};
+    voxels.component = *component;
+    const bool big = lower_case(field("endian")) == "big";
+    voxels.swapped = big != (std::endian::native == std::endian::big);
+    for (const char* key : {"lineskip", "byteskip"})
+        if (number_in(field(key)).value_or(0) != 0)
+            return Error{"the header skips lines or bytes of what is packed with bzip2", path,
+                         "save it with gzip or without compression"};
+    // Of the axes one alone may be none of space, the first or the last.
+    SONOCASE_TRY(const auto placement, nrrd_placement(header, path));
+    SONOCASE_TRY(const auto sizes, finite_numbers(words_of(field("sizes")), 0, "sizes", path));
+    if (sizes.size() > 4)
+        return Error{"volume of " + sizes_text(sizes) + " voxels", path,
+                     "expected three dimensions; export one time step"};
+    if (sizes.size() == 4) {
+        const auto matches = [&](std::size_t from) {
+            for (int axis = 0; axis < 3; ++axis)
+                if (sizes[from + static_cast<std::size_t>(axis)] != placement.size[axis])
+                    return false;
+            return true;
+        };
+        const auto vectors = vectors_in(field("spacedirections"));
+        const std::vector<std::string> kinds = words_of(lower_case(field("kinds")));
+        const auto is_space = [&](std::size_t axis) {
+            if (!vectors.empty()) return !is_nothing(vectors[axis]);
+            return axis < kinds.size() && (kinds[axis] == "domain" || kinds[axis] == "space");
+        };
+        voxels.planar = is_space(0);
+        if ((voxels.planar && is_space(3)) || !matches(voxels.planar ? 0 : 1))
+            return Error{"volume of " + sizes_text(sizes) +
+                             " voxels has its axes in another order than its geometry",
+                         path, kWriteAgain};
+        voxels.layers = static_cast<int>(voxels.planar ? sizes[3] : sizes[0]);
+    }
+    voxels.data_path = path;
+    voxels.voxels_at = header.size();
+    if (const std::string file = nrrd_data_file(path); !file.empty()) {
+        if (names_many_files(file))
+            return Error{"voxels in several files that are packed with bzip2", path,
+                         "save it with gzip or without compression"};
+        voxels.data_path = beside(path, file);
+        voxels.voxels_at = 0;
+    }
+    for (std::string_view rest = header; !rest.empty();) {
+        const std::size_t end = std::min(rest.find('\n'), rest.size());
+        const std::string_view line = trimmed(rest.substr(0, end));
+        rest.remove_prefix(std::min(end + 1, rest.size()));
+        const std::size_t assigned = line.find(":=");
+        if (line.starts_with('#') || assigned == std::string_view::npos) continue;
+        voxels.fields[std::string(line.substr(0, assigned))] =
+            without_escapes(line.substr(assigned + 2));
+    }
+    return voxels;
+}
+
+Result<std::vector<std::byte>> unpack_bzip2(std::span<const std::uint8_t> file,
+                                            std::uint64_t at,
+                                            std::uint64_t count,
+                                            const std::string& path) {
+    std::vector<std::byte> out;
+    std::vector<std::byte> beyond(4096);  // what comes after the last byte: nothing should
+    std::uint64_t total = 0;
+    const auto damaged = [&] { return cut_off(std::min(total, count), count, path); };
+    while (at < file.size()) {
+        bz_stream stream{};
+        if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) return damaged();
+        int status = BZ_OK;
+        while (status == BZ_OK) {
+            if (stream.avail_in == 0) {
+                const auto piece = std::min<std::uint64_t>(file.size() - at, 1u << 30);
+                if (piece == 0) break;
+                stream.next_in =
+                    reinterpret_cast<char*>(const_cast<std::uint8_t*>(file.data() + at));
+                stream.avail_in = static_cast<unsigned>(piece);
+                at += piece;
+            }
+            if (total < count && total == out.size())
+                out.resize(
+                    std::min<std::uint64_t>(count, std::max<std::uint64_t>(2 * total, 1 << 20)));
+            const bool wanted = total < count;
+            std::byte* to = wanted ? out.data() + total : beyond.data();
+            const std::uint64_t room = wanted ? out.size() - total : beyond.size();
+            const auto piece = static_cast<unsigned>(std::min<std::uint64_t>(room, 1u << 30));
+            stream.next_out = reinterpret_cast<char*>(to);
+            stream.avail_out = piece;
+            status = BZ2_bzDecompress(&stream);
+            const unsigned got = piece - stream.avail_out;
+            if (!wanted && got > 0) {
+                BZ2_bzDecompressEnd(&stream);
+                return Error{"holds more voxels than its header asks for (" +
+                                 std::to_string(count) + " bytes)",
+                             path, "export it again"};
+            }
+            total += got;
+        }
+        at -= stream.avail_in;
+        BZ2_bzDecompressEnd(&stream);
+        if (status == BZ_DATA_ERROR_MAGIC && total == count)
+            break;  // padding behind the last stream
+        if (status != BZ_STREAM_END) return damaged();
+    }
+    if (total < count) return damaged();
+    return out;
+}
+
+namespace {
+
+// The geometry that programs write where they were given none.
+bool is_lost(const Placement& placement) {
+    if (placement.origin_mm != Point3{0, 0, 0}) return false;
+    for (int row = 0; row < 3; ++row)
+        for (int axis = 0; axis < 3; ++axis)
+            if (std::abs(placement.columns(row, axis)) != (row == axis ? 1.0 : 0.0)) return false;
+    return true;
+}
+
+}  // namespace
 
 Status place_volume(const Placement& placement,
                     const VolumeReading& reading,
@@ -556,6 +847,11 @@ Status place_volume(const Placement& placement,
     grid.origin_mm = placement.origin_mm;
     volume.warnings.insert(volume.warnings.end(), placement.warnings.begin(),
                            placement.warnings.end());
+    if (placement.warnings.empty() && is_lost(placement))
+        volume.warnings.push_back(
+            "voxels of 1 mm that begin at 0, along plain axes: so a file looks that was written "
+            "from an array without the geometry of its scan; check size and sides of the body, or "
+            "write it again with the geometry of the scan");
     if (orthonormality_error(direction) < 1e-6) return Done{};
 
     const double side = determinant(direction);

@@ -4,9 +4,13 @@
 // the patient, which files hold them, and whether all of them are there.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <map>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "formats/base/result.h"
 #include "pipeline/import/volume/native_volume.h"
@@ -35,6 +39,28 @@ Result<Placement> nrrd_placement(std::string_view header, const std::string& pat
 Result<Placement> meta_placement(std::string_view header, const std::string& path);
 // Of a file whose name ends in .nrrd, .nhdr, .mha or .mhd.
 Result<Placement> placement_in_header(const std::string& path);
+
+// What an NRRD header says of its voxels besides their place, for encodings that the library below
+// ITK was built without (bzip2).
+struct NrrdVoxels {
+    Component component = Component::u8;
+    int layers = 1;
+    bool planar = false;
+    bool swapped = false;
+    std::string data_path;                      // the header's own path if the voxels follow it
+    std::uint64_t voxels_at = 0;                // in that file
+    std::map<std::string, std::string> fields;  // keys of the writer's own
+};
+bool is_bzip2(std::string_view nrrd_header);
+Result<NrrdVoxels> nrrd_voxels(std::string_view header, const std::string& path);
+std::string header_text(const std::string& path);  // up to where the voxels begin
+
+// Exactly `count` bytes that are packed with bzip2, one stream or several, from `at` to the end of
+// the file. Room is made as they come. Errors: damaged or cut off; more than `count` bytes.
+Result<std::vector<std::byte>> unpack_bzip2(std::span<const std::uint8_t> file,
+                                            std::uint64_t at,
+                                            std::uint64_t count,
+                                            const std::string& path);
 
 // An Error if the file holds fewer than `voxel_bytes` after its header, or is damaged gzip; Done
 // for files of another format. The library below ITK does not notice in a compressed NRRD file that

@@ -355,7 +355,7 @@ TEST(AnatomyCheck, RightBodiesAgree) {
         const AnatomyReport report = check_anatomy(summarise_body(body.labels));
         EXPECT_TRUE(report.checked) << body.name;
         EXPECT_TRUE(report.findings.empty()) << body.name << ": " << report.verdict();
-        const auto agreement = names_agreement(summarise_body(body.labels));
+        const auto agreement = names_fit(summarise_body(body.labels)).agreement;
         ASSERT_TRUE(agreement) << body.name;
         EXPECT_GT(*agreement, kNamesAgree) << body.name;
         std::printf("%s: %s, agreement of names %.1f\n", body.name.c_str(),
@@ -409,7 +409,7 @@ TEST(AnatomyCheck, WhatIsNoTorsoIsNotChecked) {
         summarise_body(sample_analytic_torso(analytic_torso_grid({6, 6, 6}), *phantom)));
     EXPECT_FALSE(report.checked);
     EXPECT_EQ(report.verdict(), "not checked: only 0 named organs");
-    EXPECT_FALSE(names_agreement(BodySummary{}));
+    EXPECT_FALSE(names_fit(BodySummary{}).agreement);
 }
 
 TEST(AnatomyCheck, OnlyWhatFitsNoBodyIsAnError) {
@@ -487,7 +487,7 @@ TEST(AnatomyCheck, AgreementChoosesBetweenTables) {
     BodySummary shifted = right;
     for (std::size_t l = 0; l < right.labels.size(); ++l)
         shifted.labels[l].name = right.labels[(l + 1) % right.labels.size()].name;
-    const auto good = names_agreement(right), bad = names_agreement(shifted);
+    const auto good = names_fit(right).agreement, bad = names_fit(shifted).agreement;
     ASSERT_TRUE(good && bad);
     EXPECT_GT(*good, kNamesAgree);
     EXPECT_LT(*bad, kNamesAgree);

@@ -196,6 +196,45 @@ TEST(PointTable, LeavesMissedReadingsOutAndCountsThem) {
     EXPECT_TRUE(std::isnan(kept->points[1].x));
 }
 
+TEST(PointTable, RowsThatTrackersWriteForNothingAreLeftOut) {
+    // What is not seen: a flag, zeros, the number of NDI.
+    for (const auto& [names, missed] :
+         {std::pair{"x,y,z,valid", "900,0,0,0\n900,0,0,false\n"},
+          {"x,y,z,is_tracked", "900,0,0,no\n900,0,0,0\n"},
+          {"x,y,z,v", "0,0,0,1\n0.000,-0.0,0,1\n"},
+          {"x,y,z,v", "-3.697314E+28,-3.697314E+28,-3.697314E+28,1\n1,2,-3.697314E28,1\n"}}) {
+        const std::string text = std::string(names) + "\n" + rows("", ",1", ",") + missed;
+        const auto table = parse_point_table(text, "a.csv");
+        expect_places(table, names);
+        EXPECT_EQ(table->left_out, 2u) << names;
+    }
+    // One row of zeros may be a place.
+    const auto one = parse_point_table("x,y,z\n" + rows("", "", ",") + "0,0,0\n", "a.csv");
+    ASSERT_TRUE(one);
+    EXPECT_EQ(one->points.size(), 11u);
+    PointTableOptions holes;
+    holes.keep_holes = true;
+    const auto kept =
+        parse_point_table("x,y,z\n" + rows("", "", ",") + "0,0,0\n0,0,0\n", "a.csv", holes);
+    ASSERT_TRUE(kept);
+    ASSERT_EQ(kept->points.size(), 12u);
+    EXPECT_TRUE(std::isnan(kept->points[11].x));
+}
+
+TEST(PointTable, RowsOfTwoSensorsAreNoOneSurface) {
+    const std::string first = rows("1,", "", ","), second = rows("2,", "", ",");
+    for (const char* name : {"sensor", "Station", "tool", "Sensor ID", "marker_name"}) {
+        const std::string names = std::string(name) + ",x,y,z\n";
+        EXPECT_NE(refusal(names + first + second).find("several sensors in one table: 1 and 2"),
+                  std::string::npos)
+            << name;
+        // As the message says: those of one alone.
+        expect_places(parse_point_table(names + first, "a.csv"), name);
+    }
+    // A name for each row is no sensor.
+    expect_places(parse_point_table("marker,x,y,z\n" + rows("m%n,", "", ","), "a.csv"), "markers");
+}
+
 TEST(PointTable, UnitsAndAxesAreThoseOfTheFileUnlessTold) {
     auto metres = *parse_point_table("X (m),Y (m),Z (m)\n0.1,0.2,0.3\n", "a");
     EXPECT_EQ(metres.unit_mm, 1000);

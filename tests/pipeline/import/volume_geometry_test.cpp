@@ -7,6 +7,8 @@
 #include <cstring>
 #include <limits>
 
+#include <bzlib.h>
+
 #include "pipeline/import/volume/label_map.h"
 #include "support/temporary_folder.h"
 #include "three_boxes.h"
@@ -355,6 +357,151 @@ TEST(VolumeGeometry, EverySpaceOfNrrdIsTurnedToThePatient) {
     const auto metres = with("space: LPS\nspace units: \"m\" \"m\" \"m\"\n", {-1, -1, 1});
     ASSERT_FALSE(metres.has_value());  // a body of 96 m
     EXPECT_NE(metres.error().expected.find("--scale"), std::string::npos);
+}
+
+std::string bzip2_bytes(const std::string& bytes) {
+    std::string packed(bytes.size() + bytes.size() / 100 + 600, '\0');
+    auto size = static_cast<unsigned>(packed.size());
+    BZ2_bzBuffToBuffCompress(packed.data(), &size, const_cast<char*>(bytes.data()),
+                             static_cast<unsigned>(bytes.size()), 1, 0, 0);
+    packed.resize(size);
+    return packed;
+}
+
+TEST(VolumeGeometry, NrrdThatIsPackedWithBzip2IsReadAsAnyOther) {
+    const TemporaryFolder folder;
+    const ImportOptions options = named(folder);
+    const std::string raw = testing::nrrd_bytes(ras_volume());
+    const std::size_t end = raw.find("\n\n") + 2;
+    const std::string voxels = raw.substr(end);
+    const auto header = [&](const std::string& encoding, const std::string& type) {
+        std::string text = raw.substr(0, end);
+        text.replace(text.find("encoding: raw"), 13, "encoding: " + encoding);
+        return text.replace(text.find("unsigned char"), 13, type);
+    };
+    const auto read = [&](const std::string& bytes) {
+        return import_label_map(folder.write("a.nrrd", bytes), options);
+    };
+    const std::string half = voxels.substr(0, 3000), rest = voxels.substr(3000);
+    for (const std::string& bytes :
+         {header("bzip2", "unsigned char") + bzip2_bytes(voxels),
+          header("BZ2", "uint8_t") + bzip2_bytes(half) + bzip2_bytes(rest)}) {
+        const auto imported = read(bytes);
+        EXPECT_EQ(wrong_voxels(imported), 0u);
+        EXPECT_TRUE(imported->report.warnings.empty());
+    }
+    std::string wide;  // of 16 bits, the upper byte first
+    for (const char value : voxels) wide += std::string(1, '\0') + value;
+    EXPECT_EQ(wrong_voxels(read("NRRD0004\nendian: big\n" +
+                                header("bz2", "unsigned short int").substr(9) + bzip2_bytes(wide))),
+              0u);
+    // In a file of its own.
+    folder.write("b.raw.bz2", bzip2_bytes(voxels));
+    std::string apart = header("bzip2", "uchar");
+    apart.insert(apart.size() - 1, "data file: b.raw.bz2\n");
+    EXPECT_EQ(wrong_voxels(import_label_map(folder.write("b.nhdr", apart), options)), 0u);
+    // Names of segments come with it.
+    std::string segments = header("bzip2", "uchar");
+    segments.insert(segments.size() - 1, "Segment0_Name:=lien\nSegment0_LabelValue:=1\n");
+    const auto with_names =
+        import_label_map(folder.write("s.seg.nrrd", segments + bzip2_bytes(voxels)));
+    ASSERT_TRUE(with_names.has_value()) << std::string(with_names.error().message());
+    EXPECT_EQ(with_names->labels.labels[1].name, "lien");
+
+    const std::string packed = bzip2_bytes(voxels);
+    for (std::size_t length = 0; length < packed.size(); length += 1 + packed.size() / 9)
+        expect_refused(read(header("bzip2", "uchar") + packed.substr(0, length)), "cut off");
+    std::string damaged = packed;
+    damaged[packed.size() / 2] ^= 0x55;
+    expect_refused(read(header("bzip2", "uchar") + damaged), "damaged");
+    // 30 MB of zeros in 50 bytes: no room is made for what the header does not ask for.
+    expect_refused(read(header("bzip2", "uchar") + bzip2_bytes(std::string(30 << 20, '\0'))),
+                   "more voxels than its header asks for");
+    expect_refused(read(header("bzip2", "block") + packed), "voxels of type block");
+    std::string skips = header("bzip2", "uchar");
+    skips.insert(skips.size() - 1, "byte skip: 4\n");
+    expect_refused(read(skips + packed), "skips");
+}
+
+TEST(VolumeGeometry, WhatTextHeadersSayTwiceIsCompared) {
+    const TemporaryFolder folder;
+    const ImportOptions options = named(folder);
+    const std::string mha = testing::mha_bytes(ras_volume());  // its matrix runs "LPI"
+    const auto with = [&](const std::string& line, const std::string& without = "") {
+        std::string bytes = mha;
+        if (!without.empty()) {
+            const std::size_t at = bytes.find(without);
+            bytes.erase(at, bytes.find('\n', at) + 1 - at);
+        }
+        bytes.insert(bytes.find("DimSize"), line + "\n");
+        return import_label_map(folder.write("a.mha", bytes), options);
+    };
+    for (const char* letters : {"LPI", "lpi", "???", "LP", "LLI"}) {
+        const auto imported = with(std::string("AnatomicalOrientation = ") + letters);
+        EXPECT_EQ(wrong_voxels(imported), 0u);
+        EXPECT_TRUE(imported->report.warnings.empty()) << letters;
+    }
+    const auto other = with("AnatomicalOrientation = RAI");
+    EXPECT_EQ(wrong_voxels(other), 0u);
+    EXPECT_TRUE(says(other, "AnatomicalOrientation says RAI and TransformMatrix LPI"));
+    // Alone it says how the axes lie.
+    const auto alone = with("AnatomicalOrientation = LPI", "TransformMatrix");
+    EXPECT_EQ(wrong_voxels(alone), 0u);
+    EXPECT_TRUE(says(alone, "taken from AnatomicalOrientation (LPI"));
+    EXPECT_TRUE(with("ElementSize = 2 4 3")->report.warnings.empty());
+    const auto sizes = with("ElementSize = 1 1 1");
+    EXPECT_EQ(wrong_voxels(sizes), 0u);
+    EXPECT_TRUE(says(sizes, "2 x 4 x 3 mm apart by ElementSpacing and are 1 x 1 x 1 mm"));
+
+    const std::string nrrd = testing::nrrd_bytes(ras_volume());
+    const auto fields = [&](const std::string& added, bool directions) {
+        std::string bytes = nrrd;
+        for (const char* key : {"space: ", "space directions", "space origin"}) {
+            if (directions) break;
+            const std::size_t at = bytes.find(key);
+            bytes.erase(at, bytes.find('\n', at) + 1 - at);
+        }
+        bytes.insert(bytes.find("encoding"), added + "\n");
+        return import_label_map(folder.write("a.nrrd", bytes), options);
+    };
+    EXPECT_TRUE(fields("spacings: NaN NaN NaN", true)->report.warnings.empty());
+    EXPECT_TRUE(says(fields("spacings: 1 1 1", true), "the directions are taken"));
+    // Sizes and middles of voxels from the ends of their axes.
+    for (const char* ends :
+         {"axis mins: 0 0 0\naxis maxs: 96 64 48\ncenterings: cell cell cell",
+          "axis mins: 1 2 1.5\naxis maxs: 95 62 46.5\ncenterings: node node node",
+          "axismins: 0 0 0\naxismaxs: 96 64 48"}) {
+        const auto imported = fields(ends, false);
+        ASSERT_TRUE(imported.has_value()) << std::string(imported.error().message());
+        EXPECT_NEAR(imported->labels.grid.spacing_mm.x, 2, 1e-9) << ends;
+        EXPECT_NEAR(imported->labels.grid.spacing_mm.z, 3, 1e-9) << ends;
+        EXPECT_NEAR(imported->labels.grid.origin_mm.z, 1.5, 1e-9) << ends;
+        EXPECT_TRUE(says(imported, "axis mins and axis maxs")) << ends;
+    }
+    const auto centimetres = fields("spacings: .2 .4 .3\nunits: \"cm\" \"cm\" \"cm\"", false);
+    ASSERT_TRUE(centimetres.has_value()) << std::string(centimetres.error().message());
+    EXPECT_NEAR(centimetres->labels.grid.spacing_mm.y, 4, 1e-9);
+    EXPECT_TRUE(says(centimetres, "(units)"));
+}
+
+TEST(VolumeGeometry, GeometryThatNobodyGaveIsTold) {
+    const TemporaryFolder folder;
+    const ImportOptions options = named(folder);
+    TinyVolume lost = ras_volume();
+    lost.columns = Matrix3{};
+    lost.origin = {0, 0, 0};
+    TinyVolume lost_lps = lost;
+    lost_lps.columns = Matrix3::diagonal({-1, -1, 1});
+    const char* words = "without the geometry of its scan";
+    EXPECT_TRUE(
+        says(import_label_map(folder.write("a.nii", testing::nifti_bytes(lost)), options), words));
+    EXPECT_TRUE(says(
+        import_label_map(folder.write("a.nrrd", testing::nrrd_bytes(lost_lps)), options), words));
+    EXPECT_TRUE(says(import_label_map(folder.write("a.mha", testing::mha_bytes(lost_lps)), options),
+                     words));
+    lost.origin.z = 1;
+    EXPECT_FALSE(
+        says(import_label_map(folder.write("a.nii", testing::nifti_bytes(lost)), options), words));
 }
 
 TEST(VolumeGeometry, SlightShearIsSquaredOffAndMoreIsResampledOnRequest) {
