@@ -139,6 +139,12 @@ void read_sweep(const TomlTable& table, std::vector<Sweep>& sweeps) {
         const bool tip = item.point("needle_tip", key.needle_tip);
         const bool direction = item.direction("needle_direction", key.needle_direction);
         key.has_needle = tip;
+        std::string acts, unread;
+        item.text("acts", acts);
+        key.acts = acts_of(acts, &unread);
+        if (!unread.empty())
+            item.add_fault("acts", "'" + unread + "' is not an act",
+                           "expected such as \"inject=5;aspirate=10\", at most four");
         if (direction && !tip)
             item.add_fault("needle_tip", "is missing beside needle_direction",
                            "expected both or neither");
@@ -275,6 +281,7 @@ Exercise read_exercise(const TomlTable& root) {
         table->finish();
     }
     for (const TomlTable& table : root.tables("pass_marks")) read_pass_mark(table, e.pass_marks);
+    e.procedure = read_procedure(root, e);
     root.finish();
     return e;
 }

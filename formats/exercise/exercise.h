@@ -13,6 +13,7 @@
 #include "formats/base/geometry.h"
 #include "formats/base/result.h"
 #include "formats/exercise/needle_makes.h"
+#include "formats/exercise/procedure.h"
 
 namespace sonocase {
 
@@ -87,6 +88,7 @@ struct SweepKey {
     bool has_needle = false;
     Point3 needle_tip;
     Vector3 needle_direction{0, 0, -1};  // hub to tip
+    ActList acts;                        // performed as this time is reached
 };
 
 struct Sweep {
@@ -148,6 +150,7 @@ struct Exercise {
         double at_least = -INFINITY;
     };
     std::vector<PassMark> pass_marks;
+    Procedure procedure;  // steps and checklist; empty: the exercise has none
 };
 
 // `where` names the file in errors.

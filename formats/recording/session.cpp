@@ -234,6 +234,7 @@ Result<Session> session_from_sequence(const Sequence& sequence,
                 sample.has_doppler = read_doppler(field.value, sample.doppler);
             if (field.name == kProbeAgeField) read_age(field.value, sample.probe_age_s);
             if (field.name == kNeedleAgeField) read_age(field.value, sample.needle_age_s);
+            if (field.name == kActField) sample.acts = acts_of(field.value);
             if (field.name == kEventField) read_events(field.value, sample, session.events);
         }
         session.samples.push_back(std::move(sample));
@@ -257,6 +258,7 @@ SequenceFrame frame_from_sample(const SessionSample& sample,
     if (!sample.settings.empty()) frame.fields.push_back({kSettingsField, sample.settings});
     if (sample.has_press) frame.fields.push_back({kPressField, press_text(sample.press)});
     if (sample.has_doppler) frame.fields.push_back({kDopplerField, doppler_text(sample.doppler)});
+    if (sample.acts.count > 0) frame.fields.push_back({kActField, acts_text(sample.acts)});
     std::string text;
     for (const SessionEvent& event : events) {
         if (!text.empty()) text += ";";

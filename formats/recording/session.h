@@ -13,6 +13,7 @@
 
 #include "formats/base/geometry.h"
 #include "formats/base/result.h"
+#include "formats/recording/acts.h"
 #include "formats/recording/sequence.h"
 
 namespace sonocase {
@@ -69,6 +70,7 @@ struct SessionSample {
     PressSample press;
     bool has_doppler = false;  // a Doppler mode was on
     DopplerSample doppler;
+    ActList acts;  // of a procedure; none in older recordings
 };
 
 // Events have fixed names; `detail` holds "key=value" words. docs/metrics.md lists them.
@@ -86,6 +88,7 @@ struct Session {
     std::vector<SessionEvent> events;  // in order of time
 };
 
+inline constexpr const char* kActField = "Act";  // acts_text() of a frame
 inline constexpr const char* kProbeTransform = "ProbeToMannequin";
 inline constexpr const char* kNeedleTransform = "NeedleToMannequin";
 inline constexpr const char* kDrawnTransform = "DrawnNeedleToMannequin";

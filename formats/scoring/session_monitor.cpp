@@ -13,10 +13,10 @@ namespace sonocase {
 namespace {
 
 constexpr const char* kNames[] = {
-    "needle_entry",    "needle_exit",    "target_hit",    "target_scanned", "no_go_contact",
-    "no_go_left",      "probe_contact",  "probe_lifted",  "needle_lost",    "needle_found",
-    "probe_lost",      "probe_found",    "deepest",       "key_frame",      "session_end",
-    "tissue_puncture", "posterior_wall", "needle_stopped"};
+    "needle_entry",    "needle_exit",    "target_hit",     "target_scanned", "no_go_contact",
+    "no_go_left",      "probe_contact",  "probe_lifted",   "needle_lost",    "needle_found",
+    "probe_lost",      "probe_found",    "deepest",        "key_frame",      "session_end",
+    "tissue_puncture", "posterior_wall", "needle_stopped", "step_performed", "complication"};
 
 // Words are separated by blanks, so names must not contain any.
 std::string word(std::string text) {
@@ -59,6 +59,14 @@ SessionEvent session_event(const LiveEvent& event,
             if (index < labels.size()) out.detail = "label=" + word(labels[index].name) + " ";
             out.detail += "force_n=" + number_text(event.value, 5);
             break;
+        case LiveEventKind::step_performed:
+            if (index < exercise.procedure.steps.size())
+                out.detail = "step=" + word(exercise.procedure.steps[index].name);
+            break;
+        case LiveEventKind::complication:
+            if (index < complication_names().size())
+                out.detail = "name=" + complication_names()[index];
+            break;
         default: break;
     }
     return out;
@@ -97,12 +105,20 @@ SessionMonitor::SessionMonitor(const Exercise& exercise,
             if (labels[i].name == name) is_no_go_[i] = true;
         }
     }
-    events_.reserve(2 * exercise.targets.size() + 24);
+    events_.reserve(2 * exercise.targets.size() + exercise.procedure.steps.size() + 24);
 }
 
 void SessionMonitor::add(LiveEventKind kind, double time_s, int index, double value) {
     if (events_.size() < events_.capacity())
         events_.push_back({kind, index, value, time_s, frame_});
+}
+
+void SessionMonitor::report_procedure(std::uint32_t new_steps, std::uint32_t new_complications) {
+    for (int bit = 0; bit < 32; ++bit) {
+        if ((new_steps >> bit & 1) != 0) add(LiveEventKind::step_performed, last_time_s_, bit);
+        if ((new_complications >> bit & 1) != 0)
+            add(LiveEventKind::complication, last_time_s_, bit);
+    }
 }
 
 void SessionMonitor::watch_state(

@@ -37,6 +37,8 @@ enum class LiveEventKind : std::uint8_t {
     tissue_puncture,  // index: label that the tip went into; value: force, N
     posterior_wall,   // the tip went through the far wall of a vessel; likewise
     needle_stopped,   // something rigid stopped the needle; likewise
+    step_performed,   // index: step of the procedure
+    complication,     // index: of complication_names()
 };
 
 struct LiveEvent {
@@ -70,6 +72,8 @@ class SessionMonitor {
                                       bool needle_ok,
                                       const Rigid& mannequin_from_drawn);
 
+    // What the procedure found in the sample just given: ProcedureRun::new_steps() and its like.
+    void report_procedure(std::uint32_t new_steps, std::uint32_t new_complications);
     // What the needle did to the tissue in the sample just given; index: label.
     void report(LiveEventKind kind, int label, double force_n) {
         add(kind, last_time_s_, label, force_n);

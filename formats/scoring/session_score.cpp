@@ -80,6 +80,61 @@ void fill_metrics(const Exercise& exercise, const MetricValues& values, SessionS
     }
 }
 
+detail::Json procedure_json(const ProcedureResult& result) {
+    using detail::Json;
+    using detail::json_number;
+    const auto when = [](double time_s) { return time_s < 0 ? Json(nullptr) : Json(time_s); };
+    Json out = Json::object();
+    out["passed"] = result.passed;
+    out["points"] = result.points;
+    out["cut"] = result.cut;
+    out["max_points"] = result.max_points;
+    Json steps = Json::array(), items = Json::array(), complications = Json::array(),
+         taken = Json::array();
+    for (const ProcedureResult::Step& step : result.steps) {
+        Json row = Json::object();
+        row["name"] = step.name;
+        row["state"] = step_state_name(step.state);
+        row["time_s"] = when(step.time_s);
+        steps.push_back(std::move(row));
+    }
+    for (const ProcedureResult::Item& item : result.items) {
+        Json row = Json::object();
+        row["name"] = item.name;
+        row["title"] = item.title;
+        row["critical"] = item.critical;
+        row["weight"] = item.weight;
+        row["ticked"] = item.ticked;
+        row["time_s"] = when(item.time_s);
+        if (!item.ticked) row["why"] = item.why;
+        if (!item.source.empty()) row["source"] = item.source;
+        items.push_back(std::move(row));
+    }
+    for (const ProcedureResult::Happened& one : result.complications) {
+        Json row = Json::object();
+        row["name"] = one.name;
+        row["time_s"] = one.time_s;
+        complications.push_back(std::move(row));
+    }
+    for (const ProcedureResult::Taken& one : result.taken) {
+        Json row = Json::object();
+        row["region"] = one.region;
+        row["mm"] = one.mm;
+        taken.push_back(std::move(row));
+    }
+    out["steps"] = std::move(steps);
+    out["items"] = std::move(items);
+    out["complications"] = std::move(complications);
+    out["taken"] = std::move(taken);
+    out["stray_acts"] = result.stray_acts;
+    out["stray_acts_at_most"] = result.stray_acts_at_most;
+    out["injected_ml"] = json_number(result.injected_ml);
+    out["aspirated_ml"] = json_number(result.aspirated_ml);
+    out["drained_ml"] = json_number(result.drained_ml);
+    out["bled_ml"] = json_number(result.bled_ml);
+    return out;
+}
+
 }  // namespace
 
 double SessionScore::value(std::string_view name) const {
@@ -125,6 +180,8 @@ SessionScore score_session(const Session& session,
     detail::score_doppler(input, values);
     out.curves = curves_of(input);
     fill_metrics(exercise, values, out);
+    out.procedure = procedure_result(session, exercise, anatomy, labels);
+    if (out.procedure) out.passed = out.passed && out.procedure->passed;
     return out;
 }
 
@@ -178,6 +235,7 @@ std::string score_json(const SessionScore& score, const Exercise& exercise) {
     }
     out["targets"] = std::move(targets);
     out["warnings"] = score.warnings;
+    if (score.procedure) out["procedure"] = procedure_json(*score.procedure);
     return detail::json_text(out, true) + "\n";
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "formats/recording/session.h"
 #include "formats/scoring/anatomy.h"
 #include "formats/scoring/insertion_detector.h"
+#include "formats/scoring/procedure_run.h"
 #include "formats/scoring/tool_track.h"
 
 namespace sonocase {
@@ -66,7 +68,8 @@ struct SessionScore {
     std::vector<InsertionScore> insertions;
     std::vector<TargetScore> targets;  // # targets of the exercise
     std::vector<PassResult> pass_marks;
-    bool passed = true;  // all pass marks; true without any
+    std::optional<ProcedureResult> procedure;  // where the exercise has one
+    bool passed = true;  // all pass marks, and the procedure; true without any
     SessionCurves curves;
     std::vector<std::string> warnings;          // whole sentences
     double value(std::string_view name) const;  // NaN if absent
@@ -89,7 +92,8 @@ BreathingMotion breathing_shown(const Exercise& exercise,
 BreathingMotion breathing_shown(const Exercise& exercise, const SessionHeader& header);
 
 // Stable JSON: {"sight_rule": kSightRule (formats/scoring/sight.h), "metrics": {name: value or
-// null}, "passed", "pass_marks": [...], "insertions": [...], "targets": [...], "warnings": [...]}.
+// null}, "passed", "pass_marks": [...], "insertions": [...], "targets": [...], "warnings": [...]};
+// with a procedure also "procedure": {steps, items, complications, taken, volumes, points, passed}.
 std::string score_json(const SessionScore& score, const Exercise& exercise);
 
 }  // namespace sonocase

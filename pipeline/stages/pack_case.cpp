@@ -56,6 +56,21 @@ void check_exercise(const Exercise& exercise,
             warnings->push_back(exercise.name + ": no-go label '" + name + "' is not in this case");
 }
 
+// What a procedure's conditions may name.
+std::vector<std::string> region_names(const Exercise& exercise, const LabelVolume& volume) {
+    std::vector<std::string> names;
+    for (const Target& target : exercise.targets) names.push_back(target.name);
+    for (const Finding& finding : exercise.findings) names.push_back(finding.lesion.name);
+    for (std::size_t l = 1; l < volume.labels.size(); ++l) names.push_back(volume.labels[l].name);
+    return names;
+}
+
+// The first line that holds the name in quotes, from 1.
+long line_of(const std::string& toml, const std::string& name) {
+    const std::size_t at = std::min(toml.find('"' + name + '"'), toml.size());
+    return 1 + std::count(toml.begin(), toml.begin() + static_cast<std::ptrdiff_t>(at), '\n');
+}
+
 // Rounds to 1/4096 mm, and normals to as many digits: finer than any use of a skin needs, and the
 // numbers compress to half the size.
 Surface rounded(Surface surface) {
@@ -121,6 +136,7 @@ Result<PackResult> pack_case(const PackInput& input) {
     bundle.preview_png = png_of(preview_picture(volume));
 
     for (EmbeddedExercise& embedded : bundle.exercises) {
+        const std::string written = embedded.toml;
         SONOCASE_TRY(auto framed, strip_frame(embedded.toml, embedded.name));
         embedded.toml = framed.toml;
         if (framed.in_ct) {
@@ -134,6 +150,10 @@ Result<PackResult> pack_case(const PackInput& input) {
         SONOCASE_TRY(auto aimed, targets_from_key(embedded.toml, embedded.name, input.key));
         embedded.toml = std::move(aimed);
         SONOCASE_TRY(auto exercise, parse_exercise(embedded.toml, embedded.name));
+        if (const std::string region = unknown_region(exercise, volume.labels); !region.empty())
+            return Error{"the procedure names a region '" + region + "' that the case lacks",
+                         embedded.name + ".toml:" + std::to_string(line_of(written, region)),
+                         suggest_name(region, region_names(exercise, volume))};
         check_exercise(exercise, volume, &report.warnings);
     }
     const auto voxels = static_cast<double>(volume.grid.voxel_count());

@@ -99,7 +99,7 @@ Result<ScanEngine> ScanEngine::create(CaseView bundle,
     if (options.depth_mm > 0) adjusted.probe.depth_mm = options.depth_mm;
     if (options.focus_mm > 0) adjusted.probe.focus_mm = options.focus_mm;
     SONOCASE_TRY(Renderer renderer, Renderer::create(bundle, adjusted, options.render));
-    return ScanEngine(bundle, std::move(adjusted), options, std::move(renderer));
+    return ScanEngine(bundle, std::move(adjusted), exercise, options, std::move(renderer));
 }
 
 void ScanEngine::observe(const TrackerReading& given, bool is_device) {
@@ -116,6 +116,12 @@ void ScanEngine::observe(const TrackerReading& given, bool is_device) {
     feed(probe_watch_, places.probe);
     feed(needle_watch_, places.needle);
     force_watch_.observe(reading.force_n, reading.time_s);
+    if (reading.restarts) {
+        procedure_.begin();
+        waiting_act_count_ = 0;
+    }
+    for (int i = 0; i < std::min(reading.acts.count, ActList::kMaxActs); ++i)
+        (void)act(reading.acts.acts[static_cast<std::size_t>(i)]);
     reading_ = reading;
     ToolPoses tools = tool_poses(reading, calibrations_, assignment_);
     // Readings in `mannequin` of no device (scripts, the mouse, sessions recorded here) were
@@ -129,6 +135,13 @@ void ScanEngine::observe(const TrackerReading& given, bool is_device) {
     if (!tools.has_needle || (!checked && needle_watch_.hold()))
         tools.mannequin_from_needle = tools_.mannequin_from_needle;
     tools_ = tools;
+}
+
+bool ScanEngine::act(const Act& act) {
+    if (!procedure_.given()) return true;
+    if (waiting_act_count_ == kMaxWaitingActs) return false;
+    waiting_acts_[static_cast<std::size_t>(waiting_act_count_++)] = act;
+    return true;
 }
 
 void add_probe_motion(const FrameInput& before, FrameInput& input) {
@@ -187,6 +200,20 @@ FrameStatus ScanEngine::frame(double now_s,
             input.needle.drag_mm = record.puncture.drag_mm;
         }
     }
+    if (procedure_.given()) {
+        const int taken = std::min(waiting_act_count_, ActList::kMaxActs);
+        for (int i = 0; i < taken; ++i) record.acts.add(waiting_acts_[static_cast<std::size_t>(i)]);
+        std::copy(waiting_acts_.begin() + taken, waiting_acts_.begin() + waiting_act_count_,
+                  waiting_acts_.begin());
+        waiting_act_count_ -= taken;
+        procedure_.update(time_s, tools.has_probe, tools.mannequin_from_probe, tools.has_needle,
+                          record.needle.mannequin_from_drawn, record.press.solved,
+                          {record.press.force_n, record.press.pressure_kpa, record.press.vein_open},
+                          record.acts);
+        record.new_steps = procedure_.new_steps();
+        record.new_complications = procedure_.new_complications();
+        input.change = procedure_.scene();
+    }
     const FrameStatus drawn = renderer_.render(input, pixels);
     const FrameStatus status = finish(input, drawn, pixels);
     record.skin_not_fitted =
@@ -201,12 +228,17 @@ void ScanEngine::begin_session(double now_s) {
     frame_ = 0;
     needle_ = NeedleState(anatomy_.get(), exercise_.needle);
     puncture_.reset();
+    procedure_.begin();
+    waiting_act_count_ = 0;
 }
 
 void ScanEngine::take_over(const ScanEngine& before) {
     needle_ = before.needle_;
     needle_.set_anatomy(anatomy_.get());
     puncture_ = before.puncture_;
+    procedure_ = before.procedure_;
+    waiting_acts_ = before.waiting_acts_;
+    waiting_act_count_ = before.waiting_act_count_;
     force_watch_ = before.force_watch_;
     sensed_press_mm_ = before.sensed_press_mm_;
     probe_watch_ = before.probe_watch_;

@@ -16,6 +16,7 @@
 #include "formats/calibration/calibration.h"
 #include "formats/exercise/exercise.h"
 #include "formats/scoring/anatomy.h"
+#include "formats/scoring/procedure_run.h"
 #include "formats/scoring/session_score.h"
 #include "runtime/engine/needle_puncture.h"
 #include "runtime/engine/needle_state.h"
@@ -64,6 +65,8 @@ struct FrameRecord {
     PressReport press;  // what the probe does to the tissue
     PunctureReport puncture;
     DopplerReport doppler;  // from the Doppler view beside the engine, where there is one
+    ActList acts;           // of the procedure, in this frame
+    std::uint32_t new_steps = 0, new_complications = 0;  // ProcedureRun's, as bits
     double reading_time_s = 0;
     bool skin_not_fitted = false;  // the probe touches skin that was not fitted; see SkinFit
 };
@@ -93,6 +96,10 @@ class ScanEngine {
     // and the scores, once its own sensor has no pose to be believed (SensorWatch::lost), whatever
     // the others say; so is one at exactly the identity among others, which senders give for none.
     void observe(const TrackerReading& reading, bool is_device);
+    // An act of the exercise's procedure, for the next frame; at most four come into one frame, the
+    // rest into those after it. False: dozens of them wait already.
+    bool act(const Act& act);
+    const ProcedureRun& procedure() const { return procedure_; }
     // Renders the frame of the last reading; pixels # width * height. Neither throws nor allocates.
     FrameStatus frame(double now_s, const ImageSettings& settings, std::span<std::uint8_t> pixels);
     // Begins a session: its time and its frame numbers count from here, and no needle is inserted
@@ -118,7 +125,11 @@ class ScanEngine {
     const RenderOptions& render_options() const { return options_.render; }
 
   private:
-    ScanEngine(CaseView bundle, Exercise exercise, EngineOptions options, Renderer renderer)
+    ScanEngine(CaseView bundle,
+               Exercise exercise,
+               const Exercise& written,
+               EngineOptions options,
+               Renderer renderer)
         : skin_(*bundle),
           skin_fit_(*bundle),
           anatomy_(std::make_shared<CaseAnatomy>(
@@ -127,6 +138,7 @@ class ScanEngine {
                   exercise, options.render.model == ImageModel::physical, options.render.effects))),
           needle_(anatomy_.get(), exercise.needle),
           puncture_(*bundle, exercise.needle),
+          procedure_(written, anatomy_, bundle->labels),
           exercise_(std::move(exercise)),
           options_(std::move(options)),
           renderer_(std::move(renderer)) {}
@@ -139,6 +151,10 @@ class ScanEngine {
     NeedleState needle_;
     PunctureState puncture_;
     ForceWatch force_watch_;
+    ProcedureRun procedure_;
+    static constexpr int kMaxWaitingActs = 64;
+    std::array<Act, kMaxWaitingActs> waiting_acts_{};
+    int waiting_act_count_ = 0;
     double sensed_press_mm_ = 0;  // depth of pressing that the force sensor's last reading asks for
     Exercise exercise_;
     EngineOptions options_;
@@ -168,6 +184,7 @@ void fill_sample(const FrameRecord& record, Sample& sample) {
     sample.mannequin_from_drawn = record.needle.mannequin_from_drawn;
     sample.has_press = record.press.solved;
     sample.press = {record.press.force_n, record.press.pressure_kpa, record.press.vein_open};
+    sample.acts = record.acts;
 }
 
 }  // namespace sonocase::runtime::inline engine

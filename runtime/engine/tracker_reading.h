@@ -8,6 +8,7 @@
 #include <cstdint>
 
 #include "formats/base/geometry.h"
+#include "formats/recording/acts.h"
 
 namespace sonocase::runtime::inline engine {
 
@@ -44,6 +45,9 @@ struct TrackerReading {
     double force_n = -1;
     int sensor_count = 0;
     std::array<SensorReading, kMaxSensors> sensors{};
+    ActList acts;  // of a script, a recording or a pedal, since the reading before
+    // A script or recording starts over or goes back: what its acts did is undone.
+    bool restarts = false;
 };
 
 }  // namespace sonocase::runtime::inline engine

@@ -34,6 +34,7 @@ struct RecordedFrame {
     bool has_press = false;
     PressSample press;
     DopplerReport doppler;
+    ActList acts;
     // The console's settings as text (settings_text.h) where they changed; empty otherwise.
     std::array<char, 640> settings{};
 };

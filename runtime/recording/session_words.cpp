@@ -194,6 +194,18 @@ std::string event_words(const LiveEvent& event,
         case LiveEventKind::no_go_left: return "Left: " + label();
         case LiveEventKind::needle_lost: return "Needle lost";
         case LiveEventKind::probe_lost: return "Probe lost";
+        case LiveEventKind::step_performed: {
+            const auto& steps = exercise.procedure.steps;
+            const auto i = static_cast<std::size_t>(std::max(event.index, 0));
+            return i < steps.size() ? "Done: " + steps[i].title : std::string();
+        }
+        case LiveEventKind::complication: {
+            const auto& names = complication_names();
+            const auto i = static_cast<std::size_t>(std::max(event.index, 0));
+            std::string name = i < names.size() ? names[i] : "a complication";
+            std::replace(name.begin(), name.end(), '_', ' ');
+            return "Complication: " + name;
+        }
         default: return {};
     }
 }

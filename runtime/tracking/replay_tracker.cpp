@@ -166,6 +166,7 @@ bool ReplayTracker::poll(double now_s, TrackerReading& reading) {
               : loop_ && duration > 0 ? lap_s + duration
                                       : -1;
     if (i == last_ && lap == laps_) return false;
+    const bool back = last_ != ~std::size_t{0} && (lap > laps_ || i < last_);
     last_ = i;
     laps_ = lap;
     reading = {};
@@ -175,6 +176,24 @@ bool ReplayTracker::poll(double now_s, TrackerReading& reading) {
     reading.device_time_s = probe[i].timestamp_s;
     reading.in_mannequin = recording_.in_mannequin;
     reading.sensor_count = recording_.needle.empty() ? 1 : 2;
+    const double until_s = probe[i].timestamp_s + 5e-7;
+    if (back && !recording_.acts.empty()) {
+        reading.restarts = true;
+        // Those of the time that is skipped are not made up for; without their poses they would
+        // do something else.
+        acted_ = 0;
+        while (acted_ < recording_.acts.size() &&
+               recording_.acts[acted_].time_s < probe[i].timestamp_s - 5e-7)
+            ++acted_;
+    }
+    while (acted_ < recording_.acts.size() && recording_.acts[acted_].time_s <= until_s) {
+        const ActList& acts = recording_.acts[acted_].acts;
+        // What does not fit comes with the next reading.
+        if (reading.acts.count + acts.count > ActList::kMaxActs) break;
+        for (int a = 0; a < acts.count; ++a)
+            reading.acts.add(acts.acts[static_cast<std::size_t>(a)]);
+        ++acted_;
+    }
     reading.sensors[kProbeSensor] = reading_of(probe[i]);
     if (!probe[i].ok) ++not_ok_;
     if (!recording_.needle.empty()) {
@@ -230,6 +249,12 @@ Result<Recording> load_recording(const std::string& files, double needle_lag_s) 
     if (!recording.in_mannequin) {
         for (Pose& pose : recording.needle) pose.timestamp_s -= needle_lag_s;
     }
+    for (const SequenceFrame& frame : sequence.frames)
+        for (const SequenceField& field : frame.fields)
+            if (field.name == kActField && std::isfinite(frame.timestamp_s))
+                recording.acts.push_back({frame.timestamp_s, acts_of(field.value)});
+    std::stable_sort(recording.acts.begin(), recording.acts.end(),
+                     [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
     const std::size_t readings = recording.probe.size() + recording.needle.size();
     const std::size_t dropped = drop_falling(recording.probe) + drop_falling(recording.needle);
     if (recording.probe.empty()) return Error{"holds no time that is a number", files, ""};

@@ -20,7 +20,12 @@ struct Recording {
     std::vector<Pose> probe;   // times increasing; at least one
     std::vector<Pose> needle;  // matched to the probe by time; may be empty
     bool in_mannequin = false;
-    Message note;  // what was left out, for the user; empty: nothing
+    struct TimedActs {
+        double time_s = 0;
+        ActList acts;
+    };
+    std::vector<TimedActs> acts;  // of a procedure, in order of time
+    Message note;                 // what was left out, for the user; empty: nothing
 };
 
 class ReplayTracker final : public Tracker {
@@ -42,6 +47,7 @@ class ReplayTracker final : public Tracker {
     double start_s_ = 0, next_s_ = -1;
     std::uint64_t laps_ = 0;
     std::size_t last_ = ~std::size_t{0};
+    std::size_t acted_ = 0;  // acts that have been handed on
     std::uint64_t sequence_ = 0, not_ok_ = 0;
     bool over_ = false;
 };

@@ -103,6 +103,19 @@ bool ScriptedSweep::poll(double now_s, TrackerReading& reading) {
     if (pose.has_needle) {
         reading.sensors[kNeedleSensor] = {SensorState::ok, pose.mannequin_from_needle, 1.0f, 0};
     }
+    if (acted_ > 0 && t < sweep_.keys[acted_ - 1].time_s - sweep_.keys.front().time_s) {
+        acted_ = 0;
+        reading.restarts = true;
+    }
+    while (acted_ < sweep_.keys.size()) {
+        const SweepKey& key = sweep_.keys[acted_];
+        if (key.time_s - sweep_.keys.front().time_s > t) break;
+        // What does not fit comes with the next reading.
+        if (reading.acts.count + key.acts.count > ActList::kMaxActs) break;
+        for (int i = 0; i < key.acts.count; ++i)
+            reading.acts.add(key.acts.acts[static_cast<std::size_t>(i)]);
+        ++acted_;
+    }
     return true;
 }
 

@@ -43,6 +43,7 @@ class ScriptedSweep final : public Tracker {
     double start_s_ = 0;
     bool over_ = false;
     std::uint64_t sequence_ = 0;
+    std::size_t acted_ = 0;  // keys whose acts have been performed
 };
 
 }  // namespace sonocase::runtime::inline tracking

@@ -55,6 +55,7 @@ void PageSession::observe(const FrameRecord& record) {
     monitor_.update(sample.time_s, sample.frame, sample.probe_ok, sample.mannequin_from_probe,
                     sample.needle_ok, sample.mannequin_from_drawn);
     report_punctures(record.puncture, monitor_);
+    monitor_.report_procedure(record.new_steps, record.new_complications);
     const std::span<const LiveEvent> events = monitor_.events();
     for (const LiveEvent& event : events) {
         session_.events.push_back(session_event(event, exercise_, bundle_.labels));

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "formats/base/geometry.h"
+#include "formats/exercise/procedure.h"
 
 namespace sonocase::runtime {
 
@@ -79,6 +80,7 @@ struct FrameInput {
     double time_s = 0;        // injected; drives breathing and pulsation
     std::uint32_t frame = 0;  // seeds the noise
     ImageSettings settings;
+    SceneChange change;  // what acts of a procedure have changed in the tissue
     // Velocity of the middle of the probe's face since the frame before, and its rotation, frame
     // `mannequin`. Only Doppler modes use them: what moves in the picture flashes in colour.
     Vector3 probe_mm_s, probe_rad_s;

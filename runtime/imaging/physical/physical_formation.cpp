@@ -50,6 +50,7 @@ class PhysicalFormation final : public ImageFormation {
           context_(input.context),
           machine_(machine_of(input)) {
         if (exercise_.breathing.amplitude_mm != 0) breathing_ = BreathingField(*input.bundle);
+        if (scene_.wire >= 0) balls_.reserve(kMaxFrameBalls);
         const auto make_background = input.options.host.make_background;
         if (input.options.read_ahead && blocks_ != nullptr && !reference_ &&
             make_background != nullptr)
@@ -133,6 +134,11 @@ class PhysicalFormation final : public ImageFormation {
                                  std::isfinite(input.time_s) ? input.time_s : 0);
         frame.effects = shown_;
         frame.press = shown_.deformation ? request.press : nullptr;
+        if (scene_.wire >= 0) {  // the exercise has a procedure
+            balls_of_frame(scene_, input.change, static_cast<int>(exercise_.findings.size()),
+                           balls_);
+            frame.balls = &balls_;
+        }
         return frame;
     }
 
@@ -147,7 +153,8 @@ class PhysicalFormation final : public ImageFormation {
     const RenderContext context_;
     const Machine machine_;
     std::vector<std::unique_ptr<Level>> levels_;
-    std::optional<ReadAhead> ahead_;  // ends before the levels that it refers to
+    mutable std::vector<TargetBall> balls_;  // of the present frame
+    std::optional<ReadAhead> ahead_;         // ends before the levels that it refers to
 };
 
 Result<std::unique_ptr<ImageFormation>> create(const FormationInput& input) {
@@ -160,10 +167,11 @@ Result<std::unique_ptr<ImageFormation>> create(const FormationInput& input) {
     jobs.run(2, [&](std::size_t job) {
         if (job == 0) {  // the longer one, on the caller's thread, whose memory it keeps
             const Machine machine = machine_of(input);
-            scene = make_physical_scene(input.bundle, shown_lesions(input.exercise),
-                                        {&jobs, textures, machine.tissue_db, machine.structures,
-                                         physical::shows_fine(machine, input.exercise.probe),
-                                         machine.speckle_reduction.variation > 0});
+            scene = make_physical_scene(
+                input.bundle, shown_lesions(input.exercise),
+                {&jobs, textures, machine.tissue_db, machine.structures,
+                 physical::shows_fine(machine, input.exercise.probe),
+                 machine.speckle_reduction.variation > 0, input.exercise.procedure.given()});
         } else {
             noise = make_physical_noise(textures->normal_levels, input.options.seed,
                                         input.scanlines + kNoiseSlack);

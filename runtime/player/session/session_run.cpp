@@ -108,6 +108,7 @@ std::span<const LiveEvent> SessionRun::observe(const FrameRecord& record,
     monitor_.update(frame.time_s, frame.frame, frame.probe_ok, frame.mannequin_from_probe,
                     frame.needle_ok, frame.mannequin_from_drawn);
     report_punctures(record.puncture, monitor_);
+    monitor_.report_procedure(record.new_steps, record.new_complications);
     const auto events = monitor_.events();
     recorder_->push(frame, events);
     if (const char* why = picture_reason(events)) {

@@ -277,8 +277,10 @@ HWY_INLINE void target_row(
     const auto kind =
         hn::And(hn::ShiftRight<16>(hn::GatherIndex(di, b.acoustics, own)), hn::Set(di, 7));
     // A ball replaces soft tissue, and also an earlier ball, which lies in soft tissue.
-    const auto soft = hn::Or(hn::Eq(kind, hn::Set(di, static_cast<std::int32_t>(kPackedSoft))),
-                             hn::Gt(own, hn::Set(di, b.label_count - 1)));
+    auto soft = hn::Or(hn::Eq(kind, hn::Set(di, static_cast<std::int32_t>(kPackedSoft))),
+                       hn::Gt(own, hn::Set(di, b.label_count - 1)));
+    if (ball.anywhere)
+        soft = hn::Or(soft, hn::Eq(kind, hn::Set(di, static_cast<std::int32_t>(kPackedFluid))));
     const auto close = hn::And(reached, hn::RebindMask(d, soft));
     if (hn::AllFalse(d, close)) return;
     met = true;

@@ -95,6 +95,23 @@ struct MetByAny {
     }
 };
 
+PhysicalTarget packed(const TargetBall& t) {
+    const auto shape = [&](int row, int column) {
+        return static_cast<float>(t.shape(row, column));
+    };
+    return {.x = static_cast<float>(t.centre_vx.x),
+            .y = static_cast<float>(t.centre_vx.y),
+            .z = static_cast<float>(t.centre_vx.z),
+            .radius_mm = static_cast<float>(t.radius_mm),
+            .reach_mm = static_cast<float>(t.reach_mm),
+            .round = t.round,
+            .shape = {shape(0, 0), shape(1, 1), shape(2, 2), shape(0, 1), shape(0, 2), shape(1, 2)},
+            .acoustics = t.acoustics,
+            .wall = static_cast<float>(t.wall),
+            .fluid = t.fluid,
+            .anywhere = t.anywhere};
+}
+
 }  // namespace
 
 PhysicalFast::PhysicalFast(const PhysicalScene& scene,
@@ -150,24 +167,9 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     for (const double db : scene.structure_dead_db)
         structure_dead_.push_back(static_cast<std::int32_t>(std::lround(16 * db)));
     if (!structure_dead_.empty()) structure_dead_.resize(256, 0);
-    for (const TargetBall& t : scene.targets) {
-        const auto shape = [&](int row, int column) {
-            return static_cast<float>(t.shape(row, column));
-        };
-        targets_.push_back({.x = static_cast<float>(t.centre_vx.x),
-                            .y = static_cast<float>(t.centre_vx.y),
-                            .z = static_cast<float>(t.centre_vx.z),
-                            .radius_mm = static_cast<float>(t.radius_mm),
-                            .reach_mm = static_cast<float>(t.reach_mm),
-                            .round = t.round,
-                            .shape = {shape(0, 0), shape(1, 1), shape(2, 2), shape(0, 1),
-                                      shape(0, 2), shape(1, 2)},
-                            .acoustics = t.acoustics,
-                            .wall = static_cast<float>(t.wall),
-                            .fluid = t.fluid});
-    }
+    for (const TargetBall& t : scene.targets) targets_.push_back(packed(t));
     frame_acoustics_ = acoustics_;
-    near_targets_.reserve(targets_.size());
+    near_targets_.reserve(kMaxFrameBalls);
     for (const PairEcho& pair : scene.pairs)
         pairs_word_.push_back(pack_pair(pair, blurred_mm(tables, pair.sigma_mm)));
     for (const Row& row : tables.rows) {
@@ -360,10 +362,11 @@ void PhysicalFast::choose_targets(const PhysicalFrame& f, bool keep_all) {
                          norm(f.motion.breathing_mm);
     const Vector3 normal = f.volume_from_probe.rotation * Vector3{0, 1, 0};
     const Point3 origin = f.volume_from_probe * Point3{0, 0, 0};
-    for (std::size_t t = 0; t < targets_.size(); ++t) {
-        const Point3 centre = scene_.grid.point_from_voxel(scene_.targets[t].centre_vx);
-        if (keep_all || std::abs(dot(normal, centre - origin)) < thick + scene_.targets[t].reach_mm)
-            near_targets_.push_back(targets_[t]);
+    const std::vector<TargetBall>& balls = f.balls != nullptr ? *f.balls : scene_.targets;
+    for (std::size_t t = 0; t < balls.size(); ++t) {
+        const Point3 centre = scene_.grid.point_from_voxel(balls[t].centre_vx);
+        if (keep_all || std::abs(dot(normal, centre - origin)) < thick + balls[t].reach_mm)
+            near_targets_.push_back(f.balls != nullptr ? packed(balls[t]) : targets_[t]);
     }
 }
 

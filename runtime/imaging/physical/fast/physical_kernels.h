@@ -84,6 +84,7 @@ struct PhysicalTarget {
     std::int32_t acoustics = 0;  // index; it follows those of the labels
     float wall = 0;
     bool fluid = false;
+    bool anywhere = false;  // shows in fluid as well
 };
 
 // The part of physical::SpeckleSide that is not worked out per beam.

@@ -60,6 +60,8 @@ struct PhysicalFrame {
     MotionState motion;
     PhysicalEffects effects;
     const press::PressField* press = nullptr;  // null: nothing is pressed
+    // Balls of this frame (balls_of_frame()); null: the scene's.
+    const std::vector<TargetBall>* balls = nullptr;
 };
 
 // Noise in tiles of signed bytes (32 is one standard deviation), read row by row from random

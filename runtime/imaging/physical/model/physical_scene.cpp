@@ -140,7 +140,8 @@ TargetTissue tissue_of_target(TargetLook look) {
     return {};
 }
 
-void add_ball(const Target& t, double radius_mm, const TargetTissue& tissue, PhysicalScene& s) {
+void add_ball(
+    const Target& t, double radius_mm, const TargetTissue& tissue, int lesion, PhysicalScene& s) {
     if (!(radius_mm > 0) || s.targets.size() >= kMaxTargets || s.acoustics.size() >= 255) return;
     TargetBall ball;
     ball.centre_vx = s.grid.voxel_from_point(t.centre);
@@ -155,6 +156,7 @@ void add_ball(const Target& t, double radius_mm, const TargetTissue& tissue, Phy
     ball.acoustics = static_cast<int>(s.acoustics.size());
     ball.wall = tissue.wall;
     ball.fluid = tissue.acoustics.kind == TissueKind::fluid;
+    ball.lesion = lesion;
     s.acoustics.push_back(tissue.acoustics);
     s.targets.push_back(ball);
 }
@@ -163,21 +165,36 @@ void add_ball(const Target& t, double radius_mm, const TargetTissue& tissue, Phy
 // kThinShellMm is left to the echo of the surface.
 void add_targets(const std::vector<Target>& targets, PhysicalScene& s) {
     constexpr double kThinShellMm = 0.75;
-    for (const Target& t : targets) {
+    for (int n = 0; n < static_cast<int>(targets.size()); ++n) {
+        const Target& t = targets[static_cast<std::size_t>(n)];
         if (t.look == TargetLook::none) continue;
         const PathologyKind* kind = find_pathology_kind(t.kind);
         if (kind == nullptr) {
-            add_ball(t, t.radius_mm, tissue_of_target(t.look), s);
+            add_ball(t, t.radius_mm, tissue_of_target(t.look), n, s);
             continue;
         }
         for (const LesionPart& part : kind->parts)
             if (part.place == PartPlace::shell && part.size >= kThinShellMm)
-                add_ball(t, t.radius_mm + part.size, tissue_of(part.tissue), s);
-        add_ball(t, t.radius_mm, tissue_of(kind->tissue), s);
+                add_ball(t, t.radius_mm + part.size, tissue_of(part.tissue), n, s);
+        add_ball(t, t.radius_mm, tissue_of(kind->tissue), n, s);
         for (const LesionPart& part : kind->parts)
             if (part.place == PartPlace::core)
-                add_ball(t, t.radius_mm * part.size, tissue_of(part.tissue), s);
+                add_ball(t, t.radius_mm * part.size, tissue_of(part.tissue), n, s);
     }
+}
+
+// Local anaesthetic is clear, fresh blood has faint echoes; a wire reflects all along, and a
+// catheter is a wall about fluid. Levels re liver, dB (assumed).
+void add_act_tissues(PhysicalScene& s) {
+    if (s.acoustics.size() + 4 > 255) return;
+    const auto add = [&](const AcousticProperties& a) {
+        s.acoustics.push_back(a);
+        return static_cast<int>(s.acoustics.size()) - 1;
+    };
+    s.clear_pool = add({-50, 0.02, TissueKind::fluid});
+    s.blood_pool = add({-14, 0.18, TissueKind::fluid});
+    s.wire = add({22, 3, TissueKind::soft});
+    s.catheter = add({-30, 0.3, TissueKind::fluid});
 }
 
 // Adds the acoustic properties of labels and targets, and the echoes between labels.
@@ -211,6 +228,7 @@ void add_tissues(const CaseBundle& bundle,
         s.has_gas = s.has_gas || s.acoustics[l].kind == TissueKind::gas;
     }
     add_targets(targets, s);
+    if (options.acts) add_act_tissues(s);
     for (AcousticProperties& a : s.acoustics) {
         if (a.kind == TissueKind::fluid) a.attenuation += kFluidSteepening;
     }
@@ -285,6 +303,57 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
         s.layers = make_tissue_layers(bundle, jobs);
     s.closed_label = press::closed_labels(bundle);
     return s;
+}
+
+void balls_of_frame(const PhysicalScene& scene,
+                    const SceneChange& change,
+                    int first_target,
+                    std::vector<TargetBall>& balls) {
+    constexpr double kSmallestMm = 0.4;  // what is smaller is gone
+    balls.clear();
+    for (TargetBall ball : scene.targets) {
+        const int target = ball.lesion - first_target;
+        if (target >= 0 && target < SceneChange::kMaxTargets) {
+            const double scale = change.target_scale[static_cast<std::size_t>(target)];
+            ball.radius_mm *= scale;
+            ball.reach_mm *= scale;
+        }
+        if (ball.radius_mm >= kSmallestMm) balls.push_back(ball);
+    }
+    if (scene.wire < 0) return;
+    for (int i = 0; i < change.pool_count; ++i) {
+        const SceneChange::Pool& pool = change.pools[static_cast<std::size_t>(i)];
+        if (pool.radius_mm < kSmallestMm) continue;
+        TargetBall ball;
+        ball.centre_vx = scene.grid.voxel_from_point(pool.centre);
+        ball.radius_mm = ball.reach_mm = pool.radius_mm;
+        ball.acoustics = pool.blood ? scene.blood_pool : scene.clear_pool;
+        ball.wall = pool.blood ? 0.5 : 2;
+        ball.fluid = !pool.blood;
+        balls.push_back(ball);
+    }
+    // An ellipsoid as long as the line; as thick as the slab shows it at least.
+    const auto add_line = [&](const SceneChange::Line& line, double radius_mm, int acoustics,
+                              double wall) {
+        const Vector3 along = line.to - line.from;
+        const double half_mm = 0.5 * norm(along);
+        if (!line.in || !(half_mm > radius_mm)) return;
+        TargetBall ball;
+        ball.centre_vx = scene.grid.voxel_from_point(line.from + 0.5 * along);
+        ball.radius_mm = radius_mm;
+        ball.reach_mm = half_mm;
+        ball.round = false;
+        const Vector3 z = normalized(along), x = any_perpendicular(z);
+        const Matrix3 axes = Matrix3::from_columns(x, cross(z, x), z);
+        const double thin = radius_mm / half_mm;
+        ball.shape = axes * Matrix3::diagonal({1, 1, thin * thin}) * transpose(axes);
+        ball.acoustics = acoustics;
+        ball.wall = wall;
+        ball.anywhere = true;
+        balls.push_back(ball);
+    };
+    add_line(change.catheter, 1.5, scene.catheter, 14);
+    add_line(change.wire, 0.8, scene.wire, 20);
 }
 
 }  // namespace sonocase::runtime

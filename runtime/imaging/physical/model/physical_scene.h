@@ -52,6 +52,8 @@ struct TargetBall {
     int acoustics = 0;    // index into PhysicalScene::acoustics
     double wall = 0;      // amplitude of its surface
     bool fluid = false;
+    bool anywhere = false;  // shows in fluid as well: a wire or catheter
+    int lesion = -1;        // of the exercise's shown lesions; -1: what an act has put there
 };
 
 // Cells of the plates of organs (plate_kind()) from the volume's corner on, x fastest: 1 where the
@@ -92,6 +94,8 @@ struct PhysicalScene {
     TissueLayers layers;
 
     std::vector<TargetBall> targets;
+    // Acoustics of what acts put into the tissue; -1: the exercise has no procedure.
+    int clear_pool = -1, blood_pool = -1, wire = -1, catheter = -1;
 
     int labels() const { return static_cast<int>(bundle->labels.size()); }
 };
@@ -103,6 +107,7 @@ struct PhysicalSceneOptions {
     MachineStructures structures;                      // structures that the machine shows
     bool fine = false;                                 // physical::shows_fine()
     bool speckle_reduction = true;                     // whether the machine has it
+    bool acts = false;                                 // the exercise has a procedure
 };
 
 // targets: those of the exercise, with its findings; those that only mark a place do not show in
@@ -112,5 +117,14 @@ struct PhysicalSceneOptions {
 Result<PhysicalScene> make_physical_scene(CaseView view,
                                           const std::vector<Target>& targets = {},
                                           const PhysicalSceneOptions& options = {});
+
+// The balls of a frame: the scene's, with the exercise's targets as large as they still are, and
+// what acts have put between them. first_target: number of shown lesions before the targets.
+// balls: cleared; allocates nothing within kMaxFrameBalls.
+inline constexpr std::size_t kMaxFrameBalls = physical::kMaxTargets + SceneChange::kMaxPools + 2;
+void balls_of_frame(const PhysicalScene& scene,
+                    const SceneChange& change,
+                    int first_target,
+                    std::vector<TargetBall>& balls);
 
 }  // namespace sonocase::runtime

@@ -215,8 +215,14 @@ NearTarget near_target(const ReferenceInput& in, const TargetBall& t, Point3 v) 
     return near;
 }
 
-bool gives_way(const ReferenceInput& in, const Sample& p) {
-    return in.scene.acoustics[p.place.label].kind == TissueKind::soft;
+// Only soft tissue gives way to a ball, and blood and other fluid to a wire.
+bool gives_way(const ReferenceInput& in, const Sample& p, const TargetBall& t) {
+    const TissueKind kind = in.scene.acoustics[p.place.label].kind;
+    return kind == TissueKind::soft || (t.anywhere && kind == TissueKind::fluid);
+}
+
+const std::vector<TargetBall>& balls_of(const ReferenceInput& in) {
+    return in.frame.balls != nullptr ? *in.frame.balls : in.scene.targets;
 }
 
 }  // namespace
@@ -241,16 +247,16 @@ void meet_surface(const ReferenceInput& in, Vector3 beam, Sample& p) {
 }
 
 void find_target(const ReferenceInput& in, Sample& p) {
-    if (!gives_way(in, p)) return;
-    for (const TargetBall& t : in.scene.targets) {
+    for (const TargetBall& t : balls_of(in)) {
+        if (!gives_way(in, p, t)) continue;
         const NearTarget near = near_target(in, t, p.v);
         if (near.reached && near.distance_mm < 0) p.acoustics_index = t.acoustics;
     }
 }
 
 void meet_targets(const ReferenceInput& in, Vector3 beam, Sample& p) {
-    if (!gives_way(in, p)) return;
-    for (const TargetBall& t : in.scene.targets) {
+    for (const TargetBall& t : balls_of(in)) {
+        if (!gives_way(in, p, t)) continue;
         const NearTarget near = near_target(in, t, p.v);
         if (!near.reached) continue;
         const Roughness rough = roughness_at(in.scene, p.v);
