@@ -73,8 +73,8 @@ class SensorWatch {
                  bool is_device,
                  bool others_moved = false);
     SensorVerdict verdict(double now_s) const;
-    // True if the sensor has no pose that can be believed now: its device says so, it is not a number,
-    // it has been silent, or its sender repeats what it once was.
+    // True if the sensor has no pose that can be believed now: its device says so, it is not a
+    // number, it has been silent, or its sender repeats what it once was.
     bool lost(double now_s) const;
     // Of the pose last believed. 0 for what is no device: its poses are of the moment they are for.
     double age_s(double now_s) const { return device_ && fresh_s_ >= 0 ? now_s - fresh_s_ : 0; }
@@ -86,8 +86,12 @@ class SensorWatch {
   private:
     SensorWatchOptions options_;
     bool seen_ = false, device_ = false, hold_ = false, usable_ = false, repeated_ = false;
-    // A source that rests to the last bit and goes on from there has no noise: a simulation.
-    bool noiseless_ = false;
+    // The sender goes on with the last pose of a tool that it has lost.
+    bool repeats() const { return repeated_ && rests_ <= 0; }
+
+    // A source that mostly goes on within 1 mm of where it rested to the last bit has no noise: a
+    // simulation. Rests less losses: above 0 it is one.
+    int rests_ = 0;
     int noisy_ = 0, others_ = 0;  // changes on end; of others since the last
     SensorReading last_;
     Rigid trusted_;
