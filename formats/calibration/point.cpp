@@ -412,4 +412,44 @@ std::vector<RestPoint> find_rests(std::span<const Pose> poses,
     return rests;
 }
 
+std::string misread_poses(std::span<const Pose> poses,
+                          const PointFit& fit,
+                          const PointOptions& options) {
+    constexpr double kPoorMm = 2;
+    const bool most = 2 * fit.inliers > fit.poses;
+    if (fit.determined && most && fit.rms_mm <= kPoorMm) return {};
+    const auto quaternion_shifted = [](const Rigid& p) {
+        const Quaternion q = quaternion_from_rotation(p.rotation);
+        return Rigid{rotation_from_quaternion({q.z, q.w, q.x, q.y}), p.translation};
+    };
+    const struct {
+        const char* sentence;
+        Rigid (*turned)(const Rigid&);
+    } kReadings[] = {
+        {"the rotations fit if rows and columns are exchanged: they were written column by column; "
+         "write them row by row",
+         [](const Rigid& p) {
+             return Rigid{transpose(p.rotation), p.translation};
+         }},
+        {"the poses fit if they are inverted: they map the tracker to the tool; record the tool to "
+         "the tracker",
+         [](const Rigid& p) { return inverse(p); }},
+        {"the rotations fit if the quaternion's last number is the scalar: name the columns in the "
+         "order in which they are, as in qx,qy,qz,qw",
+         quaternion_shifted}};
+    for (const auto& reading : kReadings) {
+        std::vector<Pose> other(poses.begin(), poses.end());
+        for (Pose& pose : other) {
+            if (orthonormality_error(pose.tracker_from_tool.rotation) < 1e-2)
+                pose.tracker_from_tool = reading.turned(pose.tracker_from_tool);
+        }
+        const PointFit again = fit_point(other, options);
+        const bool whole = 2 * again.inliers > again.poses;
+        if (again.determined && whole && again.rms_mm <= kPoorMm &&
+            (!fit.determined || !most || again.rms_mm < fit.rms_mm / 3))
+            return reading.sentence;
+    }
+    return {};
+}
+
 }  // namespace sonocase

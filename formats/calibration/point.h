@@ -111,4 +111,13 @@ std::vector<RestPoint> find_rests(std::span<const Pose> poses,
                                   Vector3 tip_mm,
                                   const RestOptions& options = {});
 
+// What else the readings may be, where a pivot fits poorly or not at all (more than 2 mm rms): the
+// sentence names the reading that fits at most a third as badly, and within 2 mm. Rotations that
+// were written column by column, poses that map the tracker to the tool, or a quaternion whose
+// scalar came last where it was read first. Empty: none of them. Five more fits, only where the
+// first is poor.
+std::string misread_poses(std::span<const Pose> poses,
+                          const PointFit& fit,
+                          const PointOptions& options = {});
+
 }  // namespace sonocase

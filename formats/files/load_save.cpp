@@ -3,17 +3,22 @@
 #include "formats/files/load_save.h"
 
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <new>
 #include <string>
 #include <string_view>
 #include <utility>
 
+#include "formats/calibration/foreign_calibration.h"
 #include "formats/files/atomic_file.h"
 #include "formats/files/thread_jobs.h"
 #include "formats/machine/machine.h"
+#include "formats/recording/pose_table.h"
 #include "formats/recording/session.h"
+#include "formats/recording/tool_frames.h"
 #include "formats/recording/transform_log.h"
+#include "formats/text/number_text.h"
 
 namespace sonocase {
 namespace {
@@ -118,34 +123,112 @@ bool looks_like_sequence(std::string_view text, const std::string& path) {
            path.ends_with(".nrrd");
 }
 
-bool has_any(const std::string& text, std::initializer_list<const char*> words) {
-    return std::any_of(words.begin(), words.end(),
-                       [&](const char* word) { return text.find(word) != std::string::npos; });
+// What a file that holds no text is, by its first bytes; empty: it may be text.
+std::string_view binary_kind(std::string_view bytes) {
+    static constexpr std::pair<std::string_view, std::string_view> kKinds[] = {
+        {"PK\x03\x04", "a zip archive, such as a spreadsheet (.xlsx) or a scene (.mrb)"},
+        {"\xD0\xCF\x11\xE0", "a spreadsheet of old Excel (.xls)"},
+        {"\x89HDF", "an HDF5 file"},
+        {"\x93NUMPY", "an array of NumPy (.npy)"},
+        {"MATLAB 5.0", "a MATLAB file (.mat)"},
+        {"TDSm", "a TDMS file"},
+        {"#ROSBAG", "a bag of ROS"},
+        {"SQLite format 3", "a database"},
+        {"\x1F\x8B", "packed with gzip"},
+        {"BZh", "packed with bzip2"},
+        {"7z\xBC\xAF", "packed with 7-Zip"},
+        {"%PDF", "a PDF"},
+        {"\x89PNG", "a picture"},
+        {"\x80\x03", "a pickle of Python"},
+        {"\x80\x04", "a pickle of Python"},
+        {"\x80\x05", "a pickle of Python"}};
+    for (const auto& [sign, kind] : kKinds) {
+        if (bytes.starts_with(sign)) return kind;
+    }
+    if (bytes.substr(0, 2) == "\xFF\xFE" || bytes.substr(0, 2) == "\xFE\xFF") return {};
+    const bool nul = bytes.substr(0, 1024).find('\0') != std::string_view::npos;
+    return nul ? "a binary file" : std::string_view();
+}
+
+Error not_readings(std::string_view kind, const std::string& path) {
+    return Error{"is " + std::string(kind), path,
+                 "expected readings: an IGSIO sequence (.mha, .nrrd), a PerkTutor log (.xml) or a "
+                 "table (CSV)"};
+}
+
+// The name of a table's tool as that of a transform: letters, digits, _ and -.
+std::string transform_of_tool(std::string name) {
+    for (char& c : name) {
+        if (!std::isalnum(static_cast<unsigned char>(c)) && c != '_' && c != '-') c = '_';
+    }
+    const bool names_frames = !split_transform_name(name).to.empty();
+    if (names_frames && name.ends_with("Transform")) name.resize(name.size() - 9);
+    return names_frames ? name : name + "ToTracker";
+}
+
+Result<Sequence> read_table(std::string_view text, const std::string& path) {
+    SONOCASE_TRY(std::vector<ToolReadings> tools, parse_pose_table(text, path));
+    std::vector<std::pair<std::string, std::vector<Pose>>> named;
+    for (ToolReadings& tool : tools) {
+        std::string name = tool.name.empty()
+                               ? rank_as_tool(std::filesystem::path(path).filename().string(),
+                                              ToolRole::needle) > 0
+                                     ? "NeedleToTracker"
+                                     : "ProbeToTracker"
+                               : transform_of_tool(std::move(tool.name));
+        named.emplace_back(std::move(name), std::move(tool.poses));
+    }
+    return sequence_of(named);
 }
 
 Result<Sequence> load_one_recording(const std::string& path) {
     return load_with(path, [&](const RawVector<std::uint8_t>& bytes) -> Result<Sequence> {
         const std::string_view text = text_of(bytes);
-        if (looks_like_transform_log(text)) return parse_transform_log(text, path);
-        if (looks_like_sequence(text, path)) return read_sequence_at(bytes, path);
-        SONOCASE_TRY(std::vector<Pose> poses, parse_poses(text, path));
-        const std::string name = std::filesystem::path(path).filename().string();
-        const bool needle = has_any(name, {"needle", "Needle", "stylus", "Stylus"});
-        return sequence_of({{needle ? "NeedleToTracker" : "ProbeToTracker", std::move(poses)}});
+        const bool sequence = looks_like_sequence(text, path);
+        if (const std::string_view kind = binary_kind(text); !kind.empty() && !sequence)
+            return not_readings(kind, path);
+        if (text.starts_with("version https://git-lfs"))
+            return Error{"is a pointer of Git LFS", path, "fetch the file itself: git lfs pull"};
+        const bool log = looks_like_transform_log(text);
+        const std::string_view head = trimmed(text.substr(0, 64));
+        if (!log && !sequence && (head.starts_with("<") || head.starts_with("{")))
+            return not_readings(head.starts_with("{") ? "JSON"
+                                                      : "XML or a web page without a "
+                                                        "TransformRecorderLog",
+                                path);
+        SONOCASE_TRY(Sequence read, log        ? parse_transform_log(text, path)
+                                    : sequence ? read_sequence_at(bytes, path)
+                                               : read_table(text, path));
+        // What this program recorded knows which of its poses count.
+        const bool ours = std::any_of(read.fields.begin(), read.fields.end(),
+                                      [](const auto& f) { return f.name == "SonocaseSession"; });
+        if (ours) return read;
+        if (const std::size_t lost = mark_lost(read); lost > 0)
+            read.notes.push_back(
+                {"{} poses that are the identity, or repeat the last while another tool moves, "
+                 "count as lost.",
+                 {std::to_string(lost)}});
+        return read;
     });
 }
 
 // The readings of one tool of a file of its own.
-Result<std::vector<Pose>> load_tool(const std::string& path, bool needle) {
+Result<std::vector<Pose>> load_tool(const std::string& path,
+                                    ToolRole role,
+                                    std::string& name,
+                                    std::vector<Message>& notes) {
     SONOCASE_TRY(const Sequence sequence, load_one_recording(path));
-    const SessionNames names = guess_names(sequence);
-    const int named = sequence.transform_index(needle ? names.needle : names.probe);
-    if (sequence.transforms.size() == 1) return poses_of(sequence, 0);
-    if (named >= 0) return poses_of(sequence, named);
-    std::string found;
-    for (const std::string& name : sequence.transforms) found += (found.empty() ? "" : ", ") + name;
-    return Error{std::string("holds no transform of a ") + (needle ? "needle" : "probe"), path,
-                 found.empty() ? "it has none" : "it has " + found};
+    notes.insert(notes.end(), sequence.notes.begin(), sequence.notes.end());
+    const int found = sequence.transforms.size() == 1 ? 0 : find_tool(sequence, role);
+    if (found >= 0) {
+        name = sequence.transforms[static_cast<std::size_t>(found)];
+        return poses_of(sequence, found);
+    }
+    std::string names;
+    for (const std::string& n : sequence.transforms) names += (names.empty() ? "" : ", ") + n;
+    return Error{
+        std::string("holds no transform of a ") + (role == ToolRole::needle ? "needle" : "probe"),
+        path, names.empty() ? "it has none" : "it has " + names};
 }
 
 }  // namespace
@@ -166,19 +249,38 @@ Result<Sequence> load_recording_file(const std::string& files) {
     std::error_code none;
     if (comma == std::string::npos || std::filesystem::exists(files, none))
         return load_one_recording(files);
-    SONOCASE_TRY(std::vector<Pose> probe, load_tool(files.substr(0, comma), false));
-    SONOCASE_TRY(std::vector<Pose> needle, load_tool(files.substr(comma + 1), true));
-    return sequence_of(
-        {{"ProbeToTracker", std::move(probe)}, {"NeedleToTracker", std::move(needle)}});
+    std::string probe_name, needle_name;
+    std::vector<Message> notes;
+    SONOCASE_TRY(std::vector<Pose> probe,
+                 load_tool(files.substr(0, comma), ToolRole::probe, probe_name, notes));
+    SONOCASE_TRY(std::vector<Pose> needle,
+                 load_tool(files.substr(comma + 1), ToolRole::needle, needle_name, notes));
+    // Frames stay as their files name them: a table names none, and goes with the other.
+    const TransformName a = split_transform_name(probe_name), b = split_transform_name(needle_name);
+    const std::string to(a.to == "Tracker" && !b.to.empty() ? b.to
+                         : a.to.empty()                     ? "Tracker"
+                                                            : a.to);
+    if (!a.to.empty() && !b.to.empty() && a.to != b.to && a.to != "Tracker" && b.to != "Tracker")
+        return Error{probe_name + " and " + needle_name + " end in different frames", files,
+                     "record both to one frame"};
+    Sequence both =
+        sequence_of({{"ProbeTo" + to, std::move(probe)}, {"NeedleTo" + to, std::move(needle)}});
+    both.notes = std::move(notes);
+    return both;
 }
 
 Result<Calibration> load_calibration(const std::string& path) {
     SONOCASE_TRY(const auto text, read_text_file(path));
-    return parse_calibration(text, path);
+    if (!looks_like_foreign_calibration(text)) return parse_calibration(text, path);
+    SONOCASE_TRY(std::vector<Calibration> found, parse_foreign_calibrations(text, path));
+    if (found.size() == 1) return std::move(found.front());
+    return Error{"holds calibrations of " + std::to_string(found.size()) + " tools", path,
+                 "expected one"};
 }
 
 Status save_calibration(const Calibration& calibration, const std::string& path) {
-    return write_file(path, format_calibration(calibration));
+    const std::string foreign = format_foreign_calibration(calibration, path);
+    return write_file(path, foreign.empty() ? format_calibration(calibration) : foreign);
 }
 
 Result<Machine> load_machine(const std::string& name_or_path) {

@@ -38,13 +38,18 @@ Result<Sequence> load_sequence(const std::string& path);
 Status save_sequence(const Sequence& sequence, const std::string& path, bool compress = false);
 
 // The one reader of everything that is a list of readings: IGSIO sequences, PerkTutor's transform
-// logs (XML) and tables of poses (formats/recording/poses.h), recognised by what they hold. A table
-// has one transform, NeedleToTracker if its file's name says needle or stylus, else ProbeToTracker.
-// "PROBE_FILE,NEEDLE_FILE" joins the probe of one with the needle of the other, each its file's
-// only transform or the one with the tool's name; frames of equal times become one.
+// logs (XML) and tables of poses (formats/recording/pose_table.h), recognised by what they hold.
+// The transforms of a table bear its tools' names, NeedleToTracker or the like; of a table of one
+// tool without a name NeedleToTracker if its file's name says needle or stylus, else
+// ProbeToTracker. Poses that are none though nobody says so are marked as lost, and noted
+// (mark_lost(), tool_frames.h), except in sessions of this program. "PROBE_FILE,NEEDLE_FILE" joins
+// the probe of one with the needle of the other, each its file's only transform or the one with the
+// tool's name; frames of equal times become one. Errors: those of the readers, and what a file is
+// that holds no readings.
 Result<Sequence> load_recording_file(const std::string& files);
 
-// Calibrations (formats/calibration/calibration.h).
+// Calibrations (formats/calibration/calibration.h), and those of other programs; written as these
+// where the path ends in .xml, .tfm or .txt (formats/calibration/foreign_calibration.h).
 Result<Calibration> load_calibration(const std::string& path);
 Status save_calibration(const Calibration& calibration, const std::string& path);
 

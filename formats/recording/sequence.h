@@ -45,6 +45,7 @@ struct Sequence {
     std::vector<std::string> transforms;  // "ProbeToTracker", without the suffix "Transform"
     std::vector<SequenceFrame> frames;
     std::vector<SequenceField> fields;  // of the whole sequence
+    std::vector<Message> notes;         // what a reader left out or put together; not kept
     // Image of a frame; a recording without images has one of 1 x 1.
     int width = 1, height = 1, depth = 1, channels = 1;
     // MET_CHAR, _UCHAR, _SHORT, _USHORT, _INT, _UINT, _FLOAT, _DOUBLE

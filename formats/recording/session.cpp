@@ -8,6 +8,8 @@
 #include <limits>
 #include <utility>
 
+#include "formats/recording/poses.h"
+#include "formats/recording/tool_frames.h"
 #include "formats/text/number_text.h"
 
 namespace sonocase {
@@ -35,11 +37,6 @@ constexpr HeaderField kHeaderFields[] = {
     {"SonocaseProgram", &SessionHeader::program},
     {"SonocaseRender", &SessionHeader::render},
     {"SonocaseAttempt", &SessionHeader::attempt}};
-
-bool has_word(const std::string& text, std::initializer_list<const char*> words) {
-    return std::any_of(words.begin(), words.end(),
-                       [&](const char* word) { return text.find(word) != std::string::npos; });
-}
 
 // An event is written as "name|detail", and several events of one frame are joined by ";". Both
 // characters are replaced in the texts.
@@ -173,16 +170,12 @@ SessionNames guess_names(const Sequence& sequence) {
         if (sequence.transform_index(kNeedleTransform) < 0) names.needle.clear();
         return names;
     }
-    names.probe.clear();
-    names.needle.clear();
-    for (const std::string& transform : sequence.transforms) {
-        if (names.needle.empty() && has_word(transform, {"Needle", "needle", "Stylus", "stylus"})) {
-            names.needle = transform;
-        } else if (names.probe.empty() &&
-                   has_word(transform, {"Probe", "probe", "Image", "Ultrasound"})) {
-            names.probe = transform;
-        }
-    }
+    const auto name_of = [&](ToolRole role) {
+        const int found = find_tool(sequence, role);
+        return found < 0 ? std::string() : sequence.transforms[static_cast<std::size_t>(found)];
+    };
+    names.probe = name_of(ToolRole::probe);
+    names.needle = name_of(ToolRole::needle);
     return names;
 }
 
@@ -207,7 +200,16 @@ Result<Session> session_from_sequence(const Sequence& sequence,
         return Error{"has no transform '" + name + "'", where,
                      known.empty() ? "it has none" : "it has " + known};
     }
+    if (in_two_frames(names.probe, names.needle)) {
+        Sequence in_one = sequence;
+        SessionNames there = names;
+        SONOCASE_TRY_DONE(bring_to_one_frame(in_one, there.probe, there.needle, where));
+        if (there.drawn == names.needle) there.drawn = there.needle;
+        return session_from_sequence(in_one, there, where);
+    }
+    session.notes = sequence.notes;
     const Rigid turn = z_along(names.needle_axis);
+    bool any = false;
     session.samples.reserve(sequence.frames.size());
     for (const SequenceFrame& frame : sequence.frames) {
         SessionSample sample;
@@ -237,7 +239,15 @@ Result<Session> session_from_sequence(const Sequence& sequence,
             if (field.name == kActField) sample.acts = acts_of(field.value);
             if (field.name == kEventField) read_events(field.value, sample, session.events);
         }
+        any = any || sample.probe_ok || sample.needle_ok;
         session.samples.push_back(std::move(sample));
+    }
+    for (const int index : {probe, needle}) {
+        if (any || index < 0) continue;
+        const std::string why = why_no_pose(sequence, index);
+        if (!why.empty())
+            session.no_pose += (session.no_pose.empty() ? "of " : "; of ") +
+                               sequence.transforms[static_cast<std::size_t>(index)] + " " + why;
     }
     return session;
 }
@@ -309,9 +319,17 @@ Status check_session(const Session& session, const std::string& where) {
     }
     if (poses == 0)
         return Error{"none of " + std::to_string(session.samples.size()) +
-                         " frames has a pose of probe or needle that counts",
+                         " frames has a pose of probe or needle that counts" +
+                         (session.no_pose.empty() ? "" : ": " + session.no_pose),
                      where,
                      "expected rotations without scale or mirror, places in mm, and status OK"};
+    std::vector<double> probe_times, needle_times;
+    for (const SessionSample& s : session.samples) {
+        if (s.probe_ok) probe_times.push_back(s.time_s);
+        if (s.needle_ok) needle_times.push_back(s.time_s);
+    }
+    SONOCASE_TRY_DONE(
+        check_times(probe_times.size() >= needle_times.size() ? probe_times : needle_times, where));
     if (poses > 10 && farthest < kMetres)
         return Error{
             "no pose lies farther than " + number_text(farthest, 3) + " mm from the origin", where,

@@ -86,6 +86,8 @@ struct Session {
     SessionHeader header;
     std::vector<SessionSample> samples;
     std::vector<SessionEvent> events;  // in order of time
+    std::vector<Message> notes;        // what readers put together or took for lost; not kept
+    std::string no_pose;               // why not one pose counts; empty: one does
 };
 
 inline constexpr const char* kActField = "Act";  // acts_text() of a frame
@@ -103,16 +105,18 @@ struct SessionNames {
     Vector3 needle_axis{0, 0, 1};
 };
 
-// The most likely names in a recording: ours if it has them, otherwise the first transform whose
-// name contains "Needle" or "Stylus", and the first with "Probe" or "Image".
+// The most likely names in a recording: ours if it has them, otherwise those that find_tool() takes
+// (formats/recording/tool_frames.h).
 SessionNames guess_names(const Sequence& sequence);
 
-// Poses that are not rigid count as not tracked. An Error when a named transform is missing.
+// Poses that are not rigid count as not tracked. Where probe and needle end in different frames,
+// one is composed with other transforms of the sequence. An Error when a named transform is
+// missing, or nothing connects the two frames.
 Result<Session> session_from_sequence(const Sequence& sequence,
                                       const SessionNames& names,
                                       const std::string& where);
 // An Error for a session whose scores would be zeros that look like a trainee's: no usable pose,
-// times that fall, or places in metres.
+// times that fall or tell nothing (check_times()), or places in metres.
 Status check_session(const Session& session, const std::string& where);
 Sequence sequence_from_session(const Session& session);
 

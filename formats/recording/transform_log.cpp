@@ -17,11 +17,12 @@ std::string_view attribute(std::string_view element, std::string_view name) {
     while (true) {
         from = element.find(name, from);
         if (from == std::string_view::npos) return {};
-        const bool starts = from == 0 || element[from - 1] == ' ' || element[from - 1] == '\t';
+        const bool starts = from == 0 || std::string_view(" \t\r\n").find(element[from - 1]) !=
+                                             std::string_view::npos;
         const std::size_t after = from + name.size();
-        if (starts && after + 1 < element.size() && element[after] == '=' &&
-            element[after + 1] == '"') {
-            const std::size_t end = element.find('"', after + 2);
+        const char quote = after + 1 < element.size() ? element[after + 1] : 0;
+        if (starts && element[after] == '=' && (quote == '"' || quote == '\'')) {
+            const std::size_t end = element.find(quote, after + 2);
             if (end == std::string_view::npos) return {};
             return element.substr(after + 2, end - after - 2);
         }
@@ -50,7 +51,10 @@ Result<Sequence> parse_transform_log(std::string_view xml, const std::string& wh
     std::vector<std::pair<double, std::string>> messages;
     std::size_t at = 0;
     int count = 0;
-    while ((at = xml.find("<log ", at)) != std::string_view::npos) {
+    while ((at = xml.find("<log", at)) != std::string_view::npos) {
+        at += 4;
+        if (at < xml.size() && std::string_view(" \t\r\n").find(xml[at]) == std::string_view::npos)
+            continue;  // another element's name
         const std::size_t end = xml.find('>', at);
         ++count;
         const std::string here = where + ", log " + std::to_string(count);

@@ -12,6 +12,9 @@
 namespace sonocase {
 namespace {
 
+// Sums of printed times round: the same recording in another form has the same neighbours.
+constexpr double kRoundS = 1e-6;
+
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kSameReadingS = 0.02;  // ages below this are not recorded
 
@@ -62,7 +65,7 @@ std::vector<Knot> knots_of(std::span<const TrackPoint> points) {
         double time_s = 0;
         Vector3 sum;
         std::size_t n = 0;
-        for (; i < points.size() && points[i].time_s < start_s + kBinS; ++i, ++n) {
+        for (; i < points.size() && points[i].time_s < start_s + kBinS - kRoundS; ++i, ++n) {
             time_s += points[i].time_s - start_s;
             sum = sum + points[i].pose.translation;
         }
@@ -75,7 +78,8 @@ std::vector<Knot> knots_of(std::span<const TrackPoint> points) {
 // Value at the knot of the quadratic in time fitted to its neighbours, by normal equations in s =
 // dt / filter: 3 x 3 and well scaled. With fewer than four neighbours the knot is unchanged.
 Point3 smoothed(const std::vector<Knot>& knots, std::size_t at, double filter_s) {
-    const double reach_s = 3 * filter_s;
+    // Neighbours at the very edge are in, however their times round.
+    const double reach_s = 3 * filter_s + kRoundS;
     std::size_t first = at, last = at;
     while (first > 0 && knots[at].time_s - knots[first - 1].time_s <= reach_s) --first;
     while (last + 1 < knots.size() && knots[last + 1].time_s - knots[at].time_s <= reach_s) ++last;

@@ -66,6 +66,7 @@ Result<ReviewInput> load_review(const std::string& session_path,
     }());
     if (const auto status = check_session(session, session_path); !status)
         input.warnings.push_back("The session cannot be judged: " + status.error().message() + ".");
+    for (const Message& note : session.notes) input.warnings.push_back(note);
     input.session = std::move(session);
     if (input.session.samples.empty()) {
         return Error{"holds no reading", session_path, "record a session with sonoplay --record"};

@@ -122,7 +122,13 @@ int calibrate_needle(int argc, char** argv) {
     // One recording beside a spin is a pivot of the tip itself.
     const bool joined = recordings.size() == 1 && !spin.empty();
     if (joined) {
-        fit = join_pivot_and_spin(fit_point(recordings[0], how.point), turned);
+        const PointFit pivot = fit_point(recordings[0], how.point);
+        fit = join_pivot_and_spin(pivot, turned);
+        if (const std::string misread = misread_poses(recordings[0], pivot, how.point);
+            !misread.empty()) {
+            fit.problem += (fit.problem.empty() ? "" : "; ") + misread;
+            fit.determined = false;
+        }
     } else if (!recordings.empty()) {
         fit = fit_needle(recordings, how);
     } else {

@@ -115,6 +115,9 @@ int calibrate_point(int argc, char** argv) {
     how.reject_outliers = !all;
     const PointFit fit = fit_point(poses, how);
     std::vector<std::string> warnings = fit.warnings;
+    std::string problem = fit.problem;
+    if (const std::string misread = misread_poses(poses, fit, how); !misread.empty())
+        problem = problem.empty() ? misread : problem + "; " + misread;
     Json json = json_of(fit);
     Tip answer{fit.tip_mm, fit.sigma_mm};
     if (refine && fit.determined) answer = refined_tip(poses, fit, json, warnings);
@@ -133,7 +136,7 @@ int calibrate_point(int argc, char** argv) {
     calibration.poses = fit.inliers;
     calibration.data_digest = digest_of_poses(poses);
     return finish_calibration(options, json, people_text(fit, answer.tip, answer.sigma),
-                              calibration, fit.problem, warnings, watch.seconds());
+                              calibration, problem, warnings, watch.seconds());
 }
 
 }  // namespace sonocase::pipeline::inline verbs

@@ -15,6 +15,7 @@
 #include "formats/calibration/pose_screen.h"
 #include "formats/files/load_save.h"
 #include "formats/recording/sequence.h"
+#include "formats/recording/tool_frames.h"
 #include "pipeline/verbs/verbs.h"
 
 namespace sonocase::pipeline::inline verbs {
@@ -72,8 +73,16 @@ Result<std::vector<Pose>> CalibrateOptions::load(const std::string& path) const 
                                        : "the sequence has no transform " + transform,
                      path, "name one with --transform: " + (names.empty() ? "it has none" : names)};
     }
+    for (const Message& note : read.notes)
+        std::fprintf(stderr, "sonocase calibrate: note: %s\n", note.c_str());
     // Poor rotations are kept as read: screen_poses reports them.
-    return poses_of(read, index);
+    std::vector<Pose> found = poses_of(read, index);
+    if (const std::string why = why_no_pose(read, index); !why.empty())
+        return Error{
+            "no pose of " + read.transforms[static_cast<std::size_t>(index)] + " counts: " + why,
+            path, "expected rotations without scale or mirror, and status OK"};
+    SONOCASE_TRY_DONE(check_places(found, path));
+    return found;
 }
 
 Result<std::vector<Pose>> CalibrateOptions::recording(std::size_t k) const {

@@ -115,6 +115,8 @@ int verb_score(int argc, char** argv) {
     if (!session) return fail("score", session.error());
     if (const auto status = check_session(*session, a.session); !status)
         return fail("score", status.error());
+    for (const Message& note : session->notes)
+        std::fprintf(stderr, "sonocase score: note: %s\n", note.c_str());
     CaseBundle bundle;
     std::vector<std::string> warnings;
     if (!a.bundle.empty()) {

@@ -119,6 +119,8 @@ class ScanEngine {
     std::shared_ptr<const Anatomy> anatomy() const { return anatomy_; }
     SensorVerdict probe_verdict(double now_s) const { return probe_watch_.verdict(now_s); }
     SensorVerdict needle_verdict(double now_s) const { return needle_watch_.verdict(now_s); }
+    // Of the pose last believed (SensorWatch::age_s()).
+    double needle_age_s(double now_s) const { return needle_watch_.age_s(now_s); }
     int jumps() const { return probe_watch_.jumps() + needle_watch_.jumps(); }
     const Renderer& renderer() const { return renderer_; }
     const Exercise& exercise() const { return exercise_; }

@@ -74,7 +74,8 @@ void SensorWatch::observe(const SensorReading& reading,
         const double rest_s = time_s - changed_s_;
         const double step =
             norm(reading.world_from_sensor.translation - last_.world_from_sensor.translation);
-        if (seen_ && repeated_ && usable_ && step < 1) noiseless_ = true;
+        if (seen_ && repeated_ && usable_)
+            rests_ = step < 1 ? std::min(rests_ + 1, 3) : std::max(rests_ - 1, -20);
         noisy_ = seen_ && rest_s <= options_.noisy_step_s
                      ? std::min(noisy_ + 1, options_.noisy_readings)
                      : 0;
@@ -82,8 +83,8 @@ void SensorWatch::observe(const SensorReading& reading,
         others_ = 0;
         repeated_ = false;
     }
-    if (device_ && !noiseless_ && noisy_ >= options_.noisy_readings &&
-        others_ >= options_.repeated_readings && time_s - changed_s_ >= options_.repeated_after_s)
+    if (device_ && noisy_ >= options_.noisy_readings && others_ >= options_.repeated_readings &&
+        time_s - changed_s_ >= options_.repeated_after_s)
         repeated_ = true;
     hold_ = false;
     if (usable_) {
@@ -109,7 +110,7 @@ void SensorWatch::observe(const SensorReading& reading,
         }
         if (!hold_) {
             trusted_s_ = time_s;
-            const bool noise = noisy_ >= options_.noisy_readings && !noiseless_;
+            const bool noise = noisy_ >= options_.noisy_readings && rests_ <= 0;
             fresh_s_ = noise ? changed_s_ : time_s;
         }
     }
@@ -120,7 +121,7 @@ void SensorWatch::observe(const SensorReading& reading,
 
 bool SensorWatch::lost(double now_s) const {
     return seen_ &&
-           (!usable_ || repeated_ || (device_ && now_s - last_s_ > options_.stale_after_s));
+           (!usable_ || repeats() || (device_ && now_s - last_s_ > options_.stale_after_s));
 }
 
 SensorVerdict SensorWatch::verdict(double now_s) const {
@@ -128,7 +129,7 @@ SensorVerdict SensorWatch::verdict(double now_s) const {
     // Others go on: this one is out of view, not its tracker silent.
     if (device_ && now_s - last_s_ > options_.stale_after_s)
         return others_ >= options_.repeated_readings ? SensorVerdict::lost : SensorVerdict::stale;
-    if (!usable_ || repeated_) return SensorVerdict::lost;
+    if (!usable_ || repeats()) return SensorVerdict::lost;
     if (device_ && last_s_ - changed_s_ > options_.frozen_after_s) return SensorVerdict::frozen;
     if (now_s - jump_s_ < options_.jump_shown_s) return SensorVerdict::jumped;
     if (last_.state == SensorState::poor) return SensorVerdict::poor;

@@ -86,8 +86,12 @@ class SensorWatch {
   private:
     SensorWatchOptions options_;
     bool seen_ = false, device_ = false, hold_ = false, usable_ = false, repeated_ = false;
-    // A source that rests to the last bit and goes on from there has no noise: a simulation.
-    bool noiseless_ = false;
+    // The sender goes on with the last pose of a tool that it has lost.
+    bool repeats() const { return repeated_ && rests_ <= 0; }
+
+    // A source that mostly goes on within 1 mm of where it rested to the last bit has no noise: a
+    // simulation. Rests less losses: above 0 it is one.
+    int rests_ = 0;
     int noisy_ = 0, others_ = 0;  // changes on end; of others since the last
     SensorReading last_;
     Rigid trusted_;

@@ -73,6 +73,7 @@ std::string score_text(const OpenedCase& opened,
     const Sequence sequence = value_of(load_recording_file(session_path));
     const Session session =
         value_of(session_from_sequence(sequence, guess_names(sequence), session_path));
+    (void)value_of(check_session(session, session_path));
     const Exercise exercise =
         given ? *given : value_of(exercise_named(opened, session.header.exercise));
     const CaseAnatomy anatomy(opened.bundle, breathing_shown(exercise, session.header));

@@ -10,6 +10,7 @@
 #include "formats/files/load_save.h"
 #include "formats/recording/sequence.h"
 #include "formats/recording/session.h"
+#include "formats/recording/tool_frames.h"
 
 namespace sonocase::runtime::inline tracking {
 namespace {
@@ -71,46 +72,31 @@ std::size_t drop_falling(std::vector<Pose>& poses) {
     return dropped;
 }
 
-Status check_places(const std::vector<Pose>& poses, const std::string& where) {
-    double farthest = 0;
-    int counted = 0;
-    for (const Pose& pose : poses) {
-        if (!pose.ok) continue;
-        ++counted;
-        farthest = std::max(farthest, norm(pose.tracker_from_tool.translation));
-    }
-    if (counted <= 10 || !(farthest < 2)) return Done{};
-    return Error{"no pose lies farther than 2 mm from the origin", where,
-                 "expected millimetres; these look like metres: multiply them by 1000"};
+bool to_mannequin(std::string_view transform) {
+    return split_transform_name(transform).to == "Mannequin";
 }
 
-bool ends_with(const std::string& text, const char* ending) {
-    const std::string end = ending;
-    return text.size() >= end.size() &&
-           text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
-
-// Index of the transform of a tool, by its name before "To"; -1: none. One to the mannequin is
-// preferred, then one to the tracker, then any; then one whose name holds the tool's.
-int transform_of(const Sequence& sequence,
-                 const std::vector<std::string>& tools,
-                 const std::string& guessed,
-                 bool& in_mannequin) {
-    int best = -1, best_rank = 0;
-    for (std::size_t i = 0; i < sequence.transforms.size(); ++i) {
-        const std::string& name = sequence.transforms[i];
-        for (const std::string& tool : tools) {
-            if (name.compare(0, tool.size() + 2, tool + "To") != 0) continue;
-            const int rank = ends_with(name, "ToMannequin") ? 3
-                             : ends_with(name, "ToTracker") ? 2
-                                                            : 1;
-            if (rank > best_rank) best = static_cast<int>(i), best_rank = rank;
+// The transform that the user named for a role: whole, with or without "Transform", or its tool
+// alone. -2: the role was given no name; an Error: the recording has none of that name.
+Result<int> transform_of_role(const Sequence& sequence,
+                              const ToolNames& tools,
+                              const std::string& role,
+                              const std::string& files) {
+    for (const auto& [given, wanted] : tools) {
+        if (given != role) continue;
+        for (std::size_t i = 0; i < sequence.transforms.size(); ++i) {
+            const std::string& name = sequence.transforms[i];
+            if (wanted == name || wanted == name + "Transform" ||
+                wanted == split_transform_name(name).from)
+                return static_cast<int>(i);
         }
+        std::string names;
+        for (const std::string& name : sequence.transforms)
+            names += (names.empty() ? "" : ", ") + name;
+        return Error{"has no transform " + wanted + " for the " + role, files,
+                     "it has " + (names.empty() ? "none" : names)};
     }
-    if (best < 0) best = sequence.transform_index(guessed);
-    in_mannequin =
-        best >= 0 && ends_with(sequence.transforms[static_cast<std::size_t>(best)], "ToMannequin");
-    return best;
+    return -2;
 }
 
 // The readings as they are replayed: those that are no rigid motion count as lost.
@@ -221,30 +207,60 @@ TrackerHealth ReplayTracker::health() const {
     return health;
 }
 
-Result<Recording> load_recording(const std::string& files, double needle_lag_s) {
-    SONOCASE_TRY(const Sequence sequence, load_recording_file(files));
+Result<Recording> load_recording(const std::string& files,
+                                 double needle_lag_s,
+                                 const ToolNames& tools) {
+    SONOCASE_TRY(Sequence sequence, load_recording_file(files));
     Recording recording;
     recording.name = files.substr(0, files.find(','));
     recording.name = recording.name.substr(recording.name.find_last_of('/') + 1);
-    const SessionNames guessed = guess_names(sequence);
-    bool probe_home = false, needle_home = false;
-    const int probe =
-        transform_of(sequence, {"Probe", "Transducer", "Image"}, guessed.probe, probe_home);
-    const int needle = transform_of(sequence, {"Needle", "Stylus"}, guessed.needle, needle_home);
-    if (probe < 0) {
+    const auto name_of = [&](int i) {
+        return i < 0 ? std::string() : sequence.transforms[static_cast<std::size_t>(i)];
+    };
+    SONOCASE_TRY(int probe_index, transform_of_role(sequence, tools, "probe", files));
+    SONOCASE_TRY(int needle_index, transform_of_role(sequence, tools, "needle", files));
+    SONOCASE_TRY(const int reference, transform_of_role(sequence, tools, "reference", files));
+    if (probe_index == -2) probe_index = find_tool(sequence, ToolRole::probe);
+    if (needle_index == -2) needle_index = find_tool(sequence, ToolRole::needle);
+    if (needle_index == probe_index) needle_index = -1;
+    std::string probe = name_of(probe_index), needle = name_of(needle_index);
+    if (probe.empty()) {
         std::string names;
         for (const std::string& name : sequence.transforms) names += " " + name;
         return Error{"no transform of a probe; found" + (names.empty() ? " none" : ":" + names),
-                     files, "expected ProbeToTracker or ProbeToMannequin"};
+                     files,
+                     "expected ProbeToTracker or ProbeToMannequin, or say --tool probe=NAME"};
     }
-    recording.probe = readings_of(sequence, probe);
-    recording.in_mannequin = probe_home;
-    if (needle >= 0 && needle_home == probe_home) recording.needle = readings_of(sequence, needle);
+    if (reference >= 0) {
+        const std::string base(split_transform_name(name_of(reference)).from);
+        for (std::string* tool : {&probe, &needle}) {
+            const TransformName name = split_transform_name(*tool);
+            if (tool->empty() || name.to == base || to_mannequin(*tool)) continue;
+            const std::string from(name.from);
+            Message said;
+            const int made = compose_transform(sequence, from, base, &said);
+            if (made < 0)
+                return Error{*tool + " and " + name_of(reference) + " share no frame", files,
+                             "the reference must be recorded by the tracker of the tools"};
+            sequence.notes.push_back(said);
+            *tool = name_of(made);
+        }
+    }
+    SONOCASE_TRY_DONE(bring_to_one_frame(sequence, probe, needle, files));
+    recording.in_mannequin = to_mannequin(probe);
+    recording.probe = readings_of(sequence, sequence.transform_index(probe));
+    if (!needle.empty()) recording.needle = readings_of(sequence, sequence.transform_index(needle));
     if (recording.probe.empty())
         return Error{"holds no pose", files, "a recording needs at least one row below its header"};
-    if (!has_times(recording.probe) || !has_times(recording.needle))
-        return Error{"its readings have no times, or all the same", files,
-                     "a replay needs them: record with time stamps in seconds"};
+    if (const std::string why = why_no_pose(sequence, sequence.transform_index(probe));
+        !why.empty())
+        return Error{"no pose of " + probe + " counts: " + why, files,
+                     "expected rotations without scale or mirror, places in mm, and status OK"};
+    for (const std::vector<Pose>* poses : {&recording.probe, &recording.needle}) {
+        std::vector<double> times_s;
+        for (const Pose& pose : *poses) times_s.push_back(pose.timestamp_s);
+        SONOCASE_TRY_DONE(check_times(times_s, files));
+    }
     SONOCASE_TRY_DONE(check_places(recording.probe, files));
     if (!recording.in_mannequin) {
         for (Pose& pose : recording.needle) pose.timestamp_s -= needle_lag_s;
@@ -259,9 +275,11 @@ Result<Recording> load_recording(const std::string& files, double needle_lag_s) 
     const std::size_t dropped = drop_falling(recording.probe) + drop_falling(recording.needle);
     if (recording.probe.empty()) return Error{"holds no time that is a number", files, ""};
     if (dropped > 0)
-        recording.note =
-            Message("{} of {} readings were left out, because their time fell or was no number.",
-                    {std::to_string(dropped), std::to_string(readings)});
+        sequence.notes.push_back(
+            {"{} of {} readings were left out, because their time fell or was no number.",
+             {std::to_string(dropped), std::to_string(readings)}});
+    for (const Message& note : sequence.notes)
+        recording.note = recording.note.empty() ? note : Message("{} {}", {recording.note, note});
     if (!recording.needle.empty()) {
         const std::vector<std::size_t> nearest = nearest_needles(recording);
         if (std::all_of(nearest.begin(), nearest.end(),

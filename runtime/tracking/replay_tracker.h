@@ -55,10 +55,13 @@ class ReplayTracker final : public Tracker {
 // Reads poses to replay: what load_recording_file() reads (formats/files/load_save.h). Readings
 // whose time falls or is not a number are left out, and noted. needle_lag_s is taken from the
 // needle's times unless they were recorded in the mannequin. The needle is lost where it has no
-// reading near in time.
-// Errors: no times; places in metres; no needle's reading at the time of any of the probe's, as of
-// two clocks.
-Result<Recording> load_recording(const std::string& files, double needle_lag_s = 0);
+// reading near in time. Tools that end in different frames are brought to one; with a transform for
+// the role `reference`, both are taken relative to it (formats/recording/tool_frames.h).
+// Errors: no times (check_times()); places in metres; no pose that counts; no needle's reading at
+// the time of any of the probe's, as of two clocks; frames that nothing connects.
+Result<Recording> load_recording(const std::string& files,
+                                 double needle_lag_s = 0,
+                                 const ToolNames& tools = {});
 
 // A recording or script at another speed, or from another place: for the tracker inside, time runs
 // faster or slower, or jumps. Speed and place are set from any thread; one thread polls.

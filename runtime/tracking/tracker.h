@@ -8,12 +8,16 @@
 #include <functional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "formats/base/mailbox.h"
 #include "formats/base/message.h"
 #include "runtime/engine/tracker_reading.h"
 
 namespace sonocase::runtime::inline tracking {
+
+// Which transform of a stream or recording is which tool: role (probe, needle, reference) and name.
+using ToolNames = std::vector<std::pair<std::string, std::string>>;
 
 enum class TrackerPhase : std::uint8_t {
     searching,  // no device yet

@@ -7,9 +7,37 @@
 #include <utility>
 
 #include "formats/calibration/calibration.h"
+#include "formats/calibration/foreign_calibration.h"
 #include "formats/files/atomic_file.h"
 
 namespace sonocase::runtime::inline player_session {
+
+namespace {
+
+// Puts a calibration in its place.
+Status take(Calibration calibration, const std::string& file, Calibrations& calibrations) {
+    std::optional<Calibration>* place = nullptr;
+    if (calibration.kind == "probe") place = &calibrations.probe;
+    if (calibration.kind == "needle") place = &calibrations.needle;
+    if (calibration.kind == "mannequin") place = &calibrations.mannequin;
+    if (!place) {
+        return Error{"kind is \"" + calibration.kind + "\"", file,
+                     "expected probe, needle or mannequin; make one with sonocase calibrate"};
+    }
+    const Vector3& sigma = calibration.sigma_mm;
+    if (!std::isfinite(sigma.x) || !std::isfinite(sigma.y) || !std::isfinite(sigma.z)) {
+        return Error{"the " + calibration.kind + " is not determined by it", file,
+                     "calibrate again; for a needle a pivot of the tip and a spin are enough"};
+    }
+    if (*place) {
+        return Error{"second calibration of the " + calibration.kind, file,
+                     "give one --calibration of each kind"};
+    }
+    *place = std::move(calibration);
+    return Done{};
+}
+
+}  // namespace
 
 Result<Calibrations> load_calibrations(const std::vector<std::string>& files) {
     Calibrations calibrations;
@@ -20,25 +48,15 @@ Result<Calibrations> load_calibrations(const std::vector<std::string>& files) {
             calibrations.needle_lag_s = *lag;
             continue;
         }
-        SONOCASE_TRY(Calibration calibration, parse_calibration(text, file));
-        std::optional<Calibration>* place = nullptr;
-        if (calibration.kind == "probe") place = &calibrations.probe;
-        if (calibration.kind == "needle") place = &calibrations.needle;
-        if (calibration.kind == "mannequin") place = &calibrations.mannequin;
-        if (!place) {
-            return Error{"kind is \"" + calibration.kind + "\"", file,
-                         "expected probe, needle or mannequin; make one with sonocase calibrate"};
+        std::vector<Calibration> found;
+        if (looks_like_foreign_calibration(text)) {
+            SONOCASE_TRY(found, parse_foreign_calibrations(text, file));
+        } else {
+            SONOCASE_TRY(Calibration one, parse_calibration(text, file));
+            found.push_back(std::move(one));
         }
-        const Vector3& sigma = calibration.sigma_mm;
-        if (!std::isfinite(sigma.x) || !std::isfinite(sigma.y) || !std::isfinite(sigma.z)) {
-            return Error{"the " + calibration.kind + " is not determined by it", file,
-                         "calibrate again; for a needle a pivot of the tip and a spin are enough"};
-        }
-        if (*place) {
-            return Error{"second calibration of the " + calibration.kind, file,
-                         "give one --calibration of each kind"};
-        }
-        *place = std::move(calibration);
+        for (Calibration& calibration : found)
+            SONOCASE_TRY_DONE(take(std::move(calibration), file, calibrations));
     }
     return calibrations;
 }

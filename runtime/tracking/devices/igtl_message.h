@@ -96,6 +96,7 @@ class MessageReader {
     const Header& header() const { return header_; }
     std::span<const std::uint8_t> body() const { return body_; }
     const std::string& problem() const { return problem_; }
+    std::size_t kept_bytes() const { return buffer_.capacity(); }  // of memory
 
   private:
     std::vector<std::uint8_t> buffer_;

@@ -7,18 +7,17 @@
 #include <chrono>
 #include <utility>
 
+#include "formats/recording/tool_frames.h"
+#include "formats/text/number_text.h"
+
 namespace sonocase::runtime::inline tracking_devices {
 namespace {
 
-bool begins_with_any(const std::string& name, std::initializer_list<const char*> words) {
-    return std::any_of(words.begin(), words.end(),
-                       [&](const char* word) { return name.rfind(word, 0) == 0; });
-}
+constexpr double kNearMm = 10;  // no tracker measures a probe for long so near to its own origin
+constexpr int kSlowPoses = 5;
 
 bool to_mannequin(const std::string& name) {
-    constexpr std::string_view kEnd = "ToMannequin";
-    return name.size() > kEnd.size() &&
-           name.compare(name.size() - kEnd.size(), kEnd.size(), kEnd) == 0;
+    return split_transform_name(name).to == "Mannequin";
 }
 
 }  // namespace
@@ -78,7 +77,7 @@ void IgtlTracker::run() {
     while (!stop_) {
         if (options_.listening) {
             Socket client = listener_.accept(0.1);
-            if (client.open()) converse(std::move(client));
+            while (client.open()) client = converse(std::move(client));
             continue;
         }
         Result<Socket> socket = Socket::connect(options_.host, options_.port, 1.0);
@@ -93,7 +92,7 @@ void IgtlTracker::run() {
     }
 }
 
-void IgtlTracker::converse(Socket socket) {
+Socket IgtlTracker::converse(Socket socket) {
     set_health(TrackerPhase::starting, "Connected; no pose has come yet.");
     {
         const std::lock_guard lock(mutex_);
@@ -107,12 +106,28 @@ void IgtlTracker::converse(Socket socket) {
     igtl::MessageReader reader;
     std::array<std::uint8_t, 16384> buffer;
     double heard_s = heard_.since_s = clock_();
+    double message_s = heard_s, looked_s = heard_s, waiting_s = 0;
+    Socket waiting;
     Message ended = "The other side closed the connection.";
     while (!stop_) {
         const long n = socket.read(buffer, 0.1);
         if (n < 0) break;
         const double now_s = clock_();
         explain(now_s);
+        if (options_.listening && now_s - looked_s > 0.1) {
+            looked_s = now_s;
+            if (!waiting.open()) {
+                waiting = listener_.accept(0);
+                waiting_s = now_s;
+            }
+            // Two that send would be two tools of one name, or two trackers' frames: one is heard.
+            // The new one takes over where no whole message has come for half a second.
+            if (waiting.open() && now_s - message_s > 0.5) return waiting;
+            if (waiting.open() && message_s > waiting_s + 0.2) {
+                waiting.close();
+                heard_.refused_s = now_s;
+            }
+        }
         if (n == 0) {
             if (now_s - heard_s > options_.silence_s) {
                 ended = "The connection fell silent.";
@@ -123,17 +138,6 @@ void IgtlTracker::converse(Socket socket) {
                 heard_.asked_s = now_s;
                 if (socket.write(igtl::encode_request(now_s)) < 0) break;
             }
-            if (options_.listening) {
-                // One client at a time is read; a new one takes over from a silent one.
-                if (now_s - heard_s > 0.5) {
-                    Socket next = listener_.accept(0);
-                    if (next.open()) {
-                        socket = std::move(next);
-                        reader = {};
-                        heard_s = now_s;
-                    }
-                }
-            }
             continue;
         }
         heard_s = now_s;
@@ -142,6 +146,7 @@ void IgtlTracker::converse(Socket socket) {
             switch (reader.next()) {
                 case igtl::MessageReader::Event::need_more: more = false; break;
                 case igtl::MessageReader::Event::message: {
+                    message_s = now_s;
                     const auto poses = igtl::parse_poses(reader.header(), reader.body());
                     // Handed on with the next pose.
                     if (const auto force = igtl::parse_force_n(reader.header(), reader.body())) {
@@ -177,18 +182,36 @@ void IgtlTracker::converse(Socket socket) {
         if (!socket.open()) break;
     }
     set_health(TrackerPhase::searching, ended);
+    return waiting;
 }
 
 // What came instead of a pose of the probe; empty: all is well.
-Message IgtlTracker::what_came() const {
+Message IgtlTracker::what_came(double now_s) const {
     const auto count = [](std::uint64_t n) { return Message(std::to_string(n)); };
+    constexpr double kShownS = 30;
+    if (heard_.refused_s >= 0 && now_s - heard_.refused_s < kShownS)
+        return {
+            "A second program connected and was refused, because one sends already; send all tools "
+            "through one, or end the other."};
     if (heard_.poses[kProbeSensor] > 0) {
         // No tracker measures a probe that long so near to its own origin.
-        if (heard_.poses[kProbeSensor] > 60 && heard_.farthest_mm < 2)
+        if (heard_.poses[kProbeSensor] > 60 && heard_.farthest_mm < kNearMm)
             return {
-                "No place of {} lies farther than 2 mm from the origin: these look like "
+                "No place of {} lies farther than 10 mm from the origin: these look like "
                 "metres; send millimetres.",
                 {names_[kProbeSensor]}};
+        const std::string &probe = names_[kProbeSensor], &needle = names_[kNeedleSensor];
+        if (!to_mannequin(probe) && !to_mannequin(needle) && in_two_frames(probe, needle) &&
+            !relative_to_reference())
+            return {
+                "{} and {} end in different frames; send both to one, or say --tool "
+                "reference=ReferenceToTracker.",
+                {probe, needle}};
+        if (heard_.slow >= kSlowPoses)
+            return {
+                "{} comes only {} times a second; a tool counts as lost after 0.25 s: raise the "
+                "rate of the sender.",
+                {probe, number_text(heard_.slow_hz, 2)}};
         return {};
     }
     if (heard_.wrong_checksum > 0)
@@ -232,7 +255,7 @@ Message IgtlTracker::what_came() const {
 void IgtlTracker::explain(double now_s) {
     if (now_s - heard_.since_s < options_.explain_s || now_s - heard_.explained_s < 0.5) return;
     heard_.explained_s = now_s;
-    const Message message = what_came();
+    const Message message = what_came(now_s);
     const std::lock_guard lock(mutex_);
     if (!message.empty() || health_.phase == TrackerPhase::streaming) health_.message = message;
 }
@@ -249,8 +272,8 @@ bool IgtlTracker::plays(const std::string& role, const std::string& name) const 
     for (const auto& [other, wanted] : options_.tools) {
         if (name == wanted || name == wanted.substr(0, 20)) return false;  // plays another
     }
-    if (role == "probe") return begins_with_any(name, {"Probe", "Transducer", "Image"});
-    if (role == "needle") return begins_with_any(name, {"Needle", "Stylus"});
+    if (role == "probe") return rank_as_tool(name, ToolRole::probe) > 0;
+    if (role == "needle") return rank_as_tool(name, ToolRole::needle) > 0;
     return false;
 }
 
@@ -271,16 +294,39 @@ int IgtlTracker::sensor_of(const std::string& name) {
         heard_.poses[i] = 0;
         return i;
     };
-    // The probe itself is preferred to its image.
-    const bool image_gives_way = wanted == kProbeSensor &&
-                                 names_[kProbeSensor].rfind("Image", 0) == 0 &&
-                                 name.rfind("Image", 0) != 0;
-    if (wanted >= 0 && (names_[wanted].empty() || image_gives_way)) return take_place(wanted);
+    // The probe itself is preferred to its image, and the mannequin to other frames.
+    const ToolRole role = wanted == kNeedleSensor ? ToolRole::needle : ToolRole::probe;
+    const bool gives_way =
+        wanted >= 0 && rank_as_tool(names_[wanted], role) < rank_as_tool(name, role);
+    if (wanted >= 0 && (names_[wanted].empty() || gives_way)) return take_place(wanted);
     // The sensors of named tools are kept free for them.
     for (int i = 2; i < kMaxSensors; ++i) {
         if (names_[i].empty()) return take_place(i);
     }
     return -1;
+}
+
+bool IgtlTracker::relative_to_reference() const {
+    return std::any_of(options_.tools.begin(), options_.tools.end(),
+                       [](const auto& tool) { return tool.first == "reference"; });
+}
+
+bool IgtlTracker::ends_in_reference(const std::string& name) const {
+    const std::string_view to = split_transform_name(name).to;
+    return std::any_of(options_.tools.begin(), options_.tools.end(), [&](const auto& tool) {
+        return tool.first == "reference" && !to.empty() &&
+               split_transform_name(tool.second).from == to;
+    });
+}
+
+void IgtlTracker::note_probe(const igtl::NamedPose& pose, double now_s) {
+    heard_.farthest_mm = std::max(heard_.farthest_mm, norm(pose.to_from.translation));
+    const double after_s = now_s - heard_.probe_s;
+    if (heard_.probe_s >= 0 && after_s > 0) {
+        heard_.slow = after_s > 0.2 && after_s < 2 ? heard_.slow + 1 : 0;
+        heard_.slow_hz = 1 / after_s;
+    }
+    heard_.probe_s = now_s;
 }
 
 void IgtlTracker::note(const igtl::NamedPose& pose) {
@@ -316,8 +362,7 @@ void IgtlTracker::take(const std::vector<igtl::NamedPose>& poses, double device_
         note(pose);
         put(reference_, pose);
     }
-    const bool relative = std::any_of(options_.tools.begin(), options_.tools.end(),
-                                      [](const auto& tool) { return tool.first == "reference"; });
+    const bool relative = relative_to_reference();
     const bool referenced = !relative || (reference_.state == SensorState::ok &&
                                           now_s - reference_.time_s <= kReferenceS);
     for (igtl::NamedPose pose : poses) {
@@ -330,10 +375,10 @@ void IgtlTracker::take(const std::vector<igtl::NamedPose>& poses, double device_
         sensor.in_mannequin = to_mannequin(pose.name);
         if (good) {
             ++heard_.poses[static_cast<std::size_t>(i)];
-            if (i == kProbeSensor)
-                heard_.farthest_mm = std::max(heard_.farthest_mm, norm(pose.to_from.translation));
+            if (i == kProbeSensor) note_probe(pose, now_s);
         }
-        if (!sensor.in_mannequin && relative) {
+        // What ends in the reference already is left as it is.
+        if (!sensor.in_mannequin && relative && !ends_in_reference(pose.name)) {
             pose.to_from = inverse(reference_.world_from_sensor) * pose.to_from;
             if (!referenced) pose.fault = igtl::PoseFault::lost;
         }

@@ -33,11 +33,14 @@ struct IgtlTrackerOptions {
     ToolNames tools;  // which transform is which tool; empty: by its name
 };
 
-// A device's name says which tool it is: one that begins with Probe, Transducer or Image is the
-// probe, one that begins with Needle or Stylus the needle; others take the next free sensors in
-// order. The pose of a name that ends in ToMannequin is that of the tool in `mannequin`. With a
-// transform for the role `reference`, all others are taken relative to it. A SENSOR message of
-// device ProbeForce gives the newtons on the probe's face, which come with the next pose.
+// A device's name says which tool it is, as in recordings (formats/recording/tool_frames.h); others
+// take the next free sensors in order. The pose of a name that ends in ToMannequin is that of the
+// tool in `mannequin`. With a transform for the role `reference`, all others are taken relative to
+// it. A SENSOR message of device ProbeForce gives the newtons on the probe's face, which come with
+// the next pose.
+//
+// A listening tracker hears one program at a time: a second one is refused while the first sends,
+// and health() says so.
 //
 // Each sensor keeps the time of its own last pose. One whose sender calls it invalid, or sends no
 // numbers for it, is lost.
@@ -55,14 +58,18 @@ class IgtlTracker final : public Tracker {
   private:
     IgtlTracker(const IgtlTrackerOptions& options, SessionClock clock, Socket listener);
     void run();
-    void converse(Socket socket);
+    // Returns the program that waits for this one's end, if there is one.
+    Socket converse(Socket socket);
     void take(const std::vector<igtl::NamedPose>& poses, double device_time_s);
     int sensor_of(const std::string& name);
     int known_sensor(const std::string& name) const;  // -1: none yet
     bool plays(const std::string& role, const std::string& name) const;
+    bool relative_to_reference() const;
+    bool ends_in_reference(const std::string& name) const;
     void note(const igtl::NamedPose& pose);
+    void note_probe(const igtl::NamedPose& pose, double now_s);
     void explain(double now_s);
-    Message what_came() const;
+    Message what_came(double now_s) const;
     void set_health(TrackerPhase phase, const Message& message);
 
     // What came on this connection, for the sentence that says why there is no pose.
@@ -72,6 +79,10 @@ class IgtlTracker final : public Tracker {
         std::string scaled_name, mirrored_name, other_type;
         std::array<std::uint64_t, kMaxSensors> poses{};
         double farthest_mm = 0;  // place of the probe
+        double probe_s = -1;     // when the probe's last pose came
+        int slow = 0;  // poses of the probe on end that came 0.2 s and more after the last
+        double slow_hz = 0;
+        double refused_s = -1;  // when a second program was turned away
     };
 
     IgtlTrackerOptions options_;

@@ -71,7 +71,7 @@ Made make_sweep(const std::string& name, const TrackerContext& context) {
 Made make_replay(const std::string& files, const TrackerContext& context) {
     // In a recording of this player both tools were seen at the same time; recordings of sensors
     // may have a lag.
-    SONOCASE_TRY(Recording recording, load_recording(files, context.needle_lag_s));
+    SONOCASE_TRY(Recording recording, load_recording(files, context.needle_lag_s, context.tools));
     return Made(std::make_unique<ReplayTracker>(std::move(recording), context.loop));
 }
 

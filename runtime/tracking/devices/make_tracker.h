@@ -17,8 +17,6 @@
 
 namespace sonocase::runtime::inline tracking_devices {
 
-// Which transform of a stream is which tool: role (probe, needle, reference) and name.
-using ToolNames = std::vector<std::pair<std::string, std::string>>;
 // "needle=StylusTipToTracker" as the command line gives them. Errors: another form or role.
 Result<ToolNames> parse_tool_names(const std::vector<std::string>& texts);
 
@@ -29,7 +27,7 @@ struct TrackerContext {
     SessionClock clock;       // for trackers with a thread
     bool loop = true;         // scripts and recordings start over when they end
     double needle_lag_s = 0;  // in a recording the needle's readings come so much later
-    ToolNames tools;          // for OpenIGTLink; empty: by the names
+    ToolNames tools;          // of OpenIGTLink and recordings; empty: by the names
 };
 
 struct TrackerKind {

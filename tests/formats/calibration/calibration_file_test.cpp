@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "formats/calibration/calibration.h"
+#include "formats/calibration/foreign_calibration.h"
 #include "support/random.h"
 
 namespace sonocase {
@@ -32,6 +33,91 @@ TEST(CalibrationFile, ComesBackAsItWas) {
     EXPECT_EQ(back->poses, 200);
     EXPECT_EQ(back->date, c.date);
     EXPECT_EQ(back->warnings, c.warnings);
+}
+
+TEST(CalibrationFile, ComesAndGoesInTheFormsOfOtherPrograms) {
+    testing::Random random(4);
+    for (const char* kind : {"needle", "probe", "mannequin"}) {
+        Calibration c;
+        c.kind = kind;
+        c.sensor_from_tool = random.rigid(100);
+        c.rms_mm = 0.3;
+        for (const char* ending : {".xml", ".tfm", ".txt"}) {
+            const std::string path = std::string("/tmp/my_") + kind + ending;
+            const std::string text = format_foreign_calibration(c, path);
+            ASSERT_TRUE(looks_like_foreign_calibration(text)) << path;
+            const auto back = parse_foreign_calibrations(text, path);
+            ASSERT_TRUE(back) << back.error().message();
+            ASSERT_EQ(back->size(), 1u);
+            EXPECT_EQ(back->front().kind, kind);
+            const Rigid apart = inverse(c.sensor_from_tool) * back->front().sensor_from_tool;
+            EXPECT_LT(norm(apart.translation) + rotation_angle(apart.rotation), 1e-7) << path;
+        }
+    }
+    EXPECT_EQ(format_foreign_calibration({}, "c.json"), "");
+    EXPECT_FALSE(looks_like_foreign_calibration("{\"format\": \"sonocase calibration\"}"));
+}
+
+// A transform file holds the inverse in LPS+: 3D Slicer's "transform to parent" of 10 mm to the
+// right and 20 mm up is written with +10 and -20.
+TEST(CalibrationFile, ItkTransformsResampleInLps) {
+    const auto read = parse_foreign_calibrations(
+        "#Insight Transform File V1.0\n#Transform 0\nTransform: AffineTransform_double_3_3\n"
+        "Parameters: 1 0 0 0 1 0 0 0 1 10 0 -20\nFixedParameters: 0 0 0\n",
+        "needle.tfm");
+    ASSERT_TRUE(read) << read.error().message();
+    EXPECT_LT(norm(read->front().sensor_from_tool.translation - Vector3{10, 0, 20}), 1e-12);
+    // A centre of rotation moves the place.
+    const auto turned = parse_foreign_calibrations(
+        "#Insight Transform File V1.0\n#Transform 0\nTransform: AffineTransform_double_3_3\n"
+        "Parameters: 0 -1 0 1 0 0 0 0 1 0 0 0\nFixedParameters: 10 0 0\n",
+        "needle.tfm");
+    ASSERT_TRUE(turned) << turned.error().message();
+    // The fixed point (10, 0, 0) LPS is (-10, 0, 0) RAS and stays.
+    EXPECT_LT(norm(turned->front().sensor_from_tool * Point3{-10, 0, 0} - Point3{-10, 0, 0}),
+              1e-12);
+}
+
+TEST(CalibrationFile, PlusGivesEachToolAndTheFaceOfTheProbe) {
+    // Pixels of 0.2 mm; the face's middle at pixel (200, 30); the image 5 mm along z of the sensor.
+    const std::string plus =
+        "<?xml version=\"1.0\"?><PlusConfiguration><CoordinateDefinitions>\n"
+        "<Transform From=\"Image\" To=\"Probe\" Matrix=\"0.2 0 0 1 0 0.2 0 2 0 0 0.2 5 0 0 0 "
+        "1\"/>\n"
+        "<Transform From=\"TransducerOriginPixel\" To=\"Image\" Matrix=\"1 0 0 200 0 1 0 30 0 0 1 "
+        "0 0 "
+        "0 0 1\"/>\n"
+        "<Transform From=\"TransducerOrigin\" To=\"TransducerOriginPixel\" Matrix=\"5 0 0 0 0 5 0 "
+        "0 "
+        "0 0 5 0 0 0 0 1\"/>\n"
+        "<Transform From='StylusTip' To='Stylus' Matrix='1 0 0 3\n 0 1 0 4\n 0 0 1 -150\n 0 0 0 1' "
+        "Error='0.4'/></CoordinateDefinitions></PlusConfiguration>";
+    const auto read = parse_foreign_calibrations(plus, "PlusDeviceSet.xml");
+    ASSERT_TRUE(read) << read.error().message();
+    ASSERT_EQ(read->size(), 2u);
+    EXPECT_EQ((*read)[0].kind, "needle");
+    EXPECT_EQ((*read)[0].rms_mm, 0.4);
+    EXPECT_LT(norm((*read)[0].sensor_from_tool.translation - Vector3{3, 4, -150}), 1e-12);
+    EXPECT_EQ((*read)[1].kind, "probe");
+    const Rigid face = (*read)[1].sensor_from_tool;
+    EXPECT_LT(norm(face.translation - Vector3{41, 8, 5}), 1e-9);
+    EXPECT_LT(norm(face.rotation.column(0) - Vector3{1, 0, 0}), 1e-9);  // along the face
+    EXPECT_LT(norm(face.rotation.column(2) - Vector3{0, 1, 0}), 1e-9);  // into the body
+    const auto fault = [](const std::string& text, const char* path) {
+        const auto bad = parse_foreign_calibrations(text, path);
+        return bad ? std::string() : bad.error().message();
+    };
+    EXPECT_NE(fault("1 0 0 3\n0 1 0 4\n0 0 1 5\n0 0 0 1\n", "c.txt").find("which tool"),
+              std::string::npos);
+    EXPECT_NE(fault("1 0 0 0\n0 1 0 0\n0 0 1 0\n3 4 5 1\n", "needle.txt").find("last row"),
+              std::string::npos);
+    EXPECT_NE(fault("2 0 0 0\n0 2 0 0\n0 0 2 0\n0 0 0 1\n", "needle.txt").find("not rigid"),
+              std::string::npos);
+    EXPECT_NE(fault("<a><Transform From='Image' To='Probe' Matrix='1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 "
+                    "1'/></a>",
+                    "p.xml")
+                  .find("Image to Probe"),
+              std::string::npos);
 }
 
 TEST(CalibrationFile, AMirrorIsNoRotationAndAnUnknownKindIsNamed) {

@@ -163,7 +163,7 @@ TEST(IgtlTracker, SaysWhyNoPoseComes) {
         {wrong, "wrong checksum"},
         {igtl::encode_transform("ImageToReference", 1, scaled), "ImageToReference has a scale"},
         {igtl::encode_transform("ProbeToTracker", 1, mirrored), "mirrored"},
-        {igtl::encode_transform("UsProbeToReference", 1, {}), "--tool probe=UsProbeToReference"},
+        {igtl::encode_transform("MarkerToReference", 1, {}), "--tool probe=MarkerToReference"},
         {igtl::encode_transform("ProbeToTracker", 1, metres), "metres"},
         {igtl::encode("STATUS", "S", 1, Bytes(31, 7)), "none with a pose"}};
     for (const auto& [message, sentence] : cases) {
@@ -399,6 +399,118 @@ TEST(IgtlTracker, SurvivesHostilePeers) {
         }));
     }
     EXPECT_GE(tracker->health().bad_frames, 3u);
+}
+
+// One program is heard. A second one is refused and told of while the first sends, and heard once
+// it does not: also where the first only drips bytes of a message that never ends.
+TEST(IgtlTracker, ASecondProgramIsRefusedWithAWordOrTakesOver) {
+    auto tracker = start_tracker(0, true);
+    const int port = static_cast<IgtlTracker&>(*tracker).port();
+    Result<Socket> first = Socket::connect("127.0.0.1", port, 5);
+    ASSERT_TRUE(first);
+    Bytes buffer(16);
+    const auto send = [&](Socket& socket, double x) {
+        socket.write(igtl::encode_transform("ProbeToTracker", 1, {{}, {x, 0, 300}}));
+    };
+    TrackerReading reading;
+    const auto x_is = [&](double x) {
+        tracker->poll(0, reading);
+        return reading.sensors[kProbeSensor].world_from_sensor.translation.x == x;
+    };
+    ASSERT_TRUE(tracker.eventually([&] {
+        send(*first, 1);
+        return x_is(1);
+    }));
+    Result<Socket> second = Socket::connect("127.0.0.1", port, 5);
+    ASSERT_TRUE(second);
+    EXPECT_TRUE(tracker.eventually([&] {
+        send(*first, 1);
+        return tracker->health().message.find("second program") != std::string::npos;
+    })) << tracker->health().message;
+    EXPECT_LT(second->read(buffer, 5), 0);  // closed
+    EXPECT_TRUE(x_is(1));
+    // A slow drip of a header.
+    Result<Socket> third = Socket::connect("127.0.0.1", port, 5);
+    ASSERT_TRUE(third);
+    const Bytes header = igtl::encode_transform("ProbeToTracker", 1, {});
+    std::size_t dripped = 0;
+    EXPECT_TRUE(tracker.eventually([&] {
+        if (dripped < 57) first->write(std::span(header).subspan(dripped++, 1));
+        send(*third, 3);
+        return x_is(3);
+    }));
+}
+
+TEST(IgtlTracker, NamesAFrameOfItsOwnAndASlowSender) {
+    Result<Socket> server = Socket::listen("127.0.0.1", 0);
+    ASSERT_TRUE(server);
+    IgtlTrackerOptions options;
+    options.port = server->port();
+    options.explain_s = 0.1;
+    auto started = IgtlTracker::start(options, clock_from_now());
+    ASSERT_TRUE(started);
+    NotifyingTracker tracker(std::move(*started));
+    Socket client = server->accept(15);
+    ASSERT_TRUE(client.open());
+    EXPECT_TRUE(tracker.eventually([&] {
+        client.write(igtl::encode_transform("ImageToTracker", 1, {{}, {1, 2, 300}}));
+        client.write(igtl::encode_transform("StylusToReference", 1, {{}, {1, 2, 300}}));
+        return tracker->health().message.find("different frames") != std::string::npos;
+    })) << tracker->health().message;
+    // The probe itself takes the place of its image.
+    client.write(igtl::encode_transform("ProbeToReference", 1, {{}, {5, 2, 300}}));
+    TrackerReading reading;
+    EXPECT_TRUE(tracker.eventually([&] {
+        tracker->poll(0, reading);
+        return reading.sensors[kProbeSensor].world_from_sensor.translation.x == 5;
+    }));
+    auto last = Clock::now() - std::chrono::seconds(1);
+    EXPECT_TRUE(tracker.eventually([&] {
+        if (seconds_since(last) > 0.25) {
+            client.write(igtl::encode_transform("ProbeToReference", 1, {{}, {5, 2, 300}}));
+            last = Clock::now();
+        }
+        return tracker->health().message.find("times a second") != std::string::npos;
+    })) << tracker->health().message;
+}
+
+// Whatever a sender sends, the tracker keeps 16 names and one message of bounded size: no more
+// memory after 20,000 messages than after 2,000.
+TEST(IgtlTracker, HostileSendersTakeNoMemoryAndStopNothing) {
+    igtl::MessageReader reader;
+    sonocase::testing::Random random(8);
+    std::size_t poses = 0, broken = 0;
+    for (int i = 0; i < 20000; ++i) {
+        // Names without end, bodies of negative sizes (0xFF...), random cuts.
+        Bytes bytes = igtl::encode_transform("Tool" + std::to_string(i), 1, {{}, {1, 2, 3}});
+        if (i % 50 == 17) {
+            for (std::size_t k = 42; k < 50; ++k) bytes[k] = 0xFF;
+        }
+        std::size_t at = 0;
+        bool over = false;
+        while (at < bytes.size() && !over) {
+            const auto n = std::min<std::size_t>(
+                bytes.size() - at, 1 + static_cast<std::size_t>(random.uniform(0, 60)));
+            reader.add(std::span(bytes).subspan(at, n));
+            at += n;
+            for (bool more = true; more;) {
+                const auto event = reader.next();
+                more = event == igtl::MessageReader::Event::message ||
+                       event == igtl::MessageReader::Event::bad_crc;
+                if (event == igtl::MessageReader::Event::message)
+                    poses += igtl::parse_poses(reader.header(), reader.body()).size();
+                over = over || event == igtl::MessageReader::Event::broken;
+            }
+        }
+        if (over) reader = {}, ++broken;  // as the tracker closes the connection
+        ASSERT_LE(reader.kept_bytes(), igtl::kMaxBody + 16384) << i;
+        if (i == 2000) {
+            EXPECT_LT(reader.kept_bytes(), 512u);
+        }
+    }
+    EXPECT_EQ(broken, 400u);
+    EXPECT_EQ(poses, 19600u);
+    EXPECT_LT(reader.kept_bytes(), 512u);
 }
 
 TEST(IgtlServer, SurvivesAThousandConnects) {
