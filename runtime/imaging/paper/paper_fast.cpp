@@ -137,7 +137,7 @@ void PaperFast::turn_block(const Rigid& volume_from_probe, int first_line) {
                       beside = volume_from_probe.rotation * Vector3{n.x, 0, n.z};
         for (int axis = 0; axis < 3; ++axis) {
             const auto put = [&](int row, double value) {
-                directions_[row * lines_ + l] = static_cast<float>(value);
+                directions_[row * lines_ + l] = static_cast<float>(65536 * value);
             };
             put(axis, per_voxel * along[axis]);
             put(3 + axis, per_voxel * beside[axis]);

@@ -75,7 +75,7 @@ inline constexpr double kDetailAlongMm = 1.6, kDetailAcross = 0.021, kDetailRamp
 inline constexpr double kMinContrast = 0.25, kMaxContrast = 1.75;
 inline constexpr int kMaxDetailReach = 8;  // beams
 inline constexpr double kMaxDetail = 3;    // log2 of power: 9 dB
-// Keeps the mean grey of two looks under an exponent of 0.75: d/dw of the mean of e^0.75 = 0.
+// Keeps the mean grey of two looks about as it is: d/dw of the mean of e^0.75 = 0.
 inline constexpr double kDetailMiddle = 0.1;
 
 inline bool has_speckle_reduction(const Tables& t) {

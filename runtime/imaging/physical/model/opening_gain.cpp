@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <vector>
 
 namespace sonocase::runtime::physical {
 namespace {
 
-constexpr int kBeams = 49;          // in the middle third of the picture
+constexpr int kBeams = 49;          // in the middle half of the picture
+constexpr std::size_t kPlaces = 5;  // of a script that looks around; they share the beams
 constexpr double kStepMm = 1;       // along a beam
 constexpr double kSearchMm = 100;   // the skin is looked for this far before and beyond the place
 constexpr double kShadowDb = 24;    // a beam that is so much darker than tissue alone makes it
@@ -30,21 +32,11 @@ int label_at(const CaseBundle& bundle, Point3 p) {
     return bundle.label_bricks.at(i, j, k);
 }
 
-// Where the exercise looks, on the skin; nothing if its beam does not enter the body.
-std::optional<Rigid> opening_pose(const CaseBundle& bundle, const Exercise& exercise) {
-    Point3 at = exercise.start_probe;
-    Vector3 beam = exercise.start_beam, lateral{1, 0, 0};
-    if (!exercise.sweeps.empty()) {
-        const auto named = std::find_if(exercise.sweeps.begin(), exercise.sweeps.end(),
-                                        [](const Sweep& s) { return s.name == "needle"; });
-        const Sweep& sweep = named != exercise.sweeps.end() ? *named : exercise.sweeps.front();
-        if (!sweep.keys.empty()) {
-            const SweepKey& key = sweep.keys[sweep.keys.size() / 2];
-            at = key.probe;
-            beam = key.beam;
-            lateral = key.lateral;
-        }
-    }
+// The pose on the skin nearest to a place; nothing if its beam does not enter the body.
+std::optional<Rigid> pose_on_skin(const CaseBundle& bundle,
+                                  Point3 at,
+                                  Vector3 beam,
+                                  Vector3 lateral) {
     if (!(norm(beam) > 0)) return {};
     const Vector3 z = normalized(beam);
     Vector3 x = lateral - dot(lateral, z) * z;
@@ -58,6 +50,30 @@ std::optional<Rigid> opening_pose(const CaseBundle& bundle, const Exercise& exer
     }
     if (!nearest) return {};
     return Rigid{Matrix3::from_columns(x, cross(z, x), z), at + *nearest * z - Point3{}};
+}
+
+// Where the exercise looks: the middle of its script with a needle; or places all along its first
+// script, since one of them may show nothing but gas; or its start.
+std::vector<Rigid> opening_poses(const CaseBundle& bundle, const Exercise& exercise) {
+    std::vector<Rigid> poses;
+    const auto add = [&](Point3 at, Vector3 beam, Vector3 lateral) {
+        if (const auto pose = pose_on_skin(bundle, at, beam, lateral)) poses.push_back(*pose);
+    };
+    const auto needle = std::find_if(exercise.sweeps.begin(), exercise.sweeps.end(),
+                                     [](const Sweep& s) { return s.name == "needle"; });
+    const bool looks_around = needle == exercise.sweeps.end();
+    if (exercise.sweeps.empty() ||
+        (looks_around ? exercise.sweeps.front() : *needle).keys.empty()) {
+        add(exercise.start_probe, exercise.start_beam, {1, 0, 0});
+        return poses;
+    }
+    const auto& keys = (looks_around ? exercise.sweeps.front() : *needle).keys;
+    const std::size_t places = looks_around ? std::min(kPlaces, keys.size()) : 1;
+    for (std::size_t n = 0; n < places; ++n) {
+        const SweepKey& key = keys[(2 * n + 1) * keys.size() / (2 * places)];
+        add(key.probe, key.beam, key.lateral);
+    }
+    return poses;
 }
 
 // Amplitude at which the machine draws a grey, dB; of organs, whose grey is a mean.
@@ -83,18 +99,19 @@ OpeningGain opening_gain(const PhysicalScene& scene,
                          const ScanGeometry& g) {
     OpeningGain out;
     const CaseBundle& bundle = *scene.bundle;
-    const auto pose = opening_pose(bundle, exercise);
-    if (!pose) return out;
+    const std::vector<Rigid> poses = opening_poses(bundle, exercise);
+    if (poses.empty()) return out;
     const Machine& machine = tables.machine;
     const bool walled = machine.structures.wall && !scene.layers.empty();
     std::array<double, 8> sum{}, count{};
     for (int b = 0; b < kBeams; ++b) {
+        const Rigid& pose = poses[static_cast<std::size_t>(b) % poses.size()];
         const double line = (g.scanlines - 1) * (0.25 + 0.5 * b / (kBeams - 1));
         const PlanePoint o = g.beam_origin(line), d = g.beam_direction(line);
         double lost_db = 0, shadow_db = 0;
         bool entered = false;
         for (double r = 0.5 * kStepMm; r < g.depth_mm; r += kStepMm) {
-            const Point3 p = *pose * Point3{o.x + r * d.x, 0, o.z + r * d.z};
+            const Point3 p = pose * Point3{o.x + r * d.x, 0, o.z + r * d.z};
             const int label = label_at(bundle, p);
             if (label == kBeyond) break;
             const AcousticProperties& a = scene.acoustics[static_cast<std::size_t>(label)];
