@@ -663,19 +663,34 @@ std::optional<Component> component_named(std::string type) {
         if (type.ends_with(ending) && type.size() > std::string_view(ending).size() &&
             type != "uint" && type != "signedint" && type != "unsignedint")
             type.resize(type.size() - std::string_view(ending).size());
-    const std::pair<Component, std::initializer_list<std::string_view>> kNames[] = {
-        {Component::u8, {"uchar", "unsignedchar", "uint8"}},
-        {Component::i8, {"signedchar", "int8"}},
-        {Component::u16, {"ushort", "unsignedshort", "uint16"}},
-        {Component::i16, {"short", "signedshort", "int16"}},
-        {Component::u32, {"uint", "unsignedint", "uint32"}},
-        {Component::i32, {"int", "signedint", "int32"}},
-        {Component::u64, {"ulonglong", "unsignedlonglong", "uint64"}},
-        {Component::i64, {"longlong", "signedlonglong", "int64"}},
-        {Component::f32, {"float"}},
-        {Component::f64, {"double"}}};
-    for (const auto& [component, names] : kNames)
-        if (std::find(names.begin(), names.end(), type) != names.end()) return component;
+    constexpr std::pair<std::string_view, Component> kNames[] = {
+        {"uchar", Component::u8},
+        {"unsignedchar", Component::u8},
+        {"uint8", Component::u8},
+        {"signedchar", Component::i8},
+        {"int8", Component::i8},
+        {"ushort", Component::u16},
+        {"unsignedshort", Component::u16},
+        {"uint16", Component::u16},
+        {"short", Component::i16},
+        {"signedshort", Component::i16},
+        {"int16", Component::i16},
+        {"uint", Component::u32},
+        {"unsignedint", Component::u32},
+        {"uint32", Component::u32},
+        {"int", Component::i32},
+        {"signedint", Component::i32},
+        {"int32", Component::i32},
+        {"ulonglong", Component::u64},
+        {"unsignedlonglong", Component::u64},
+        {"uint64", Component::u64},
+        {"longlong", Component::i64},
+        {"signedlonglong", Component::i64},
+        {"int64", Component::i64},
+        {"float", Component::f32},
+        {"double", Component::f64}};
+    for (const auto& [name, component] : kNames)
+        if (name == type) return component;
     return std::nullopt;
 }
 
