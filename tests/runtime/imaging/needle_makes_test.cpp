@@ -182,8 +182,9 @@ TEST(NeedleMakes, ShowInTissueAsMeasured) {
     for (const NeedleMake& make : needle_makes()) {
         const Curve c = figures(turn_needle(tissue(), linear_exercise(make)));
         report("tissue", make, c);
-        if (make.measured_width_deg > 0)
+        if (make.measured_width_deg > 0) {
             EXPECT_NEAR(c.width_deg, make.measured_width_deg, 3) << make.name;
+        }
         EXPECT_NEAR(c.floor, make.measured_floor, 0.08) << make.name;
         EXPECT_NEAR(c.towards, make.measured_tip_towards, 0.25 * make.measured_tip_towards)
             << make.name;
@@ -201,8 +202,9 @@ TEST(NeedleMakes, ShowInWaterAsMeasured) {
     for (const NeedleMake& make : needle_makes()) {
         const Curve c = figures(turn_needle(bundle, linear_exercise(make), kWaterGainDb));
         report("water", make, c);
-        if (make.measured_width_deg > 0)
+        if (make.measured_width_deg > 0) {
             EXPECT_NEAR(c.width_deg, make.measured_width_deg, 4) << make.name;
+        }
         EXPECT_NEAR(c.floor, make.measured_floor, 0.12) << make.name;
     }
 }
