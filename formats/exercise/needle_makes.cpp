@@ -20,7 +20,7 @@ constexpr std::array kMakes{
                false, 20, 0.04, 0.39, 0.09},
     NeedleMake{"ablation", "Ablation electrode, grey coat",     2.00, 0.0920, 0.1150, 0.1950, 0.1520,
                false, 28, 0.53, 0.86, 0.75},
-    NeedleMake{"notched", "Notched needle: bright at every angle", 2.00, 0.1550, 0.1150, 0.0645, 0.0310,
+    NeedleMake{"notched", "Notched needle: bright at every angle", 2.00, 0.1550, 0.1150, 0.0608, 0.0250,
                true, 0, 0.80, 0.34, 0.07},
 };
 // clang-format on
