@@ -14,13 +14,13 @@ constexpr std::array kMakes{
                false, 25, 0.32, 0.75, 0.56},
     NeedleMake{"trocar", "Trocar needle, three facets",         1.27, 0.0637, 0.1031, 0.1983, 0.1361,
                false, 24, 0.29, 0.78, 0.59},
-    NeedleMake{"rod", "Polished rod, cut straight",             2.00, 0.0238, 0.0852, 0.0571, 0.0414,
+    NeedleMake{"rod", "Polished rod, cut straight",             2.00, 0.0320, 0.0857, 0.0571, 0.0335,
                false, 20, 0.11, 0.30, 0.09},
-    NeedleMake{"nitinol", "Nitinol stylet, polished",           2.00, 0.04, 0.097, 0.14, 0.04,
+    NeedleMake{"nitinol", "Nitinol stylet, polished",           2.00, 0.0248, 0.0858, 0.0741, 0.0335,
                false, 20, 0.04, 0.39, 0.09},
-    NeedleMake{"ablation", "Ablation electrode, grey coat",     2.00, 0.21, 0.11, 0.30, 0.25,
+    NeedleMake{"ablation", "Ablation electrode, grey coat",     2.00, 0.0920, 0.1150, 0.1950, 0.1520,
                false, 28, 0.53, 0.86, 0.75},
-    NeedleMake{"notched", "Notched needle: bright at every angle", 2.00, 0.34, 0.11, 0.12, 0.04,
+    NeedleMake{"notched", "Notched needle: bright at every angle", 2.00, 0.1550, 0.1150, 0.0608, 0.0250,
                true, 0, 0.80, 0.34, 0.07},
 };
 // clang-format on
