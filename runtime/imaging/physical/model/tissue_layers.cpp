@@ -62,6 +62,10 @@ void march(const Cells& c, const std::vector<std::uint8_t>& open, CellField& u) 
         while (end > begin && !p[end - 1]) --end;
         open_in[row] = {begin, end};
     }
+    // A row that its last visit left as it was is visited again only after it or a row beside it has
+    // changed: rows count their visits. Most rows lie far from the surface.
+    std::vector<int> changed_at(open_in.size(), 0), settled_at(open_in.size(), -1);
+    int visit = 0;
     bool changed = true;  // when one order changes nothing, the next ones will not either
     for (int order = 0; order < 8 && changed; ++order) {
         changed = false;
@@ -72,7 +76,16 @@ void march(const Cells& c, const std::vector<std::uint8_t>& open, CellField& u) 
             const int k = index(k0, 2);
             for (int j0 = 0; j0 < c.size.y; ++j0) {
                 const int j = index(j0, 1);
-                const auto [begin, end] = open_in[k * c.size.y + j];
+                const std::size_t row_at = static_cast<std::size_t>(k) * c.size.y + j;
+                const auto [begin, end] = open_in[row_at];
+                int last = changed_at[row_at];
+                if (j > 0) last = std::max(last, changed_at[row_at - 1]);
+                if (j < c.size.y - 1) last = std::max(last, changed_at[row_at + 1]);
+                if (k > 0) last = std::max(last, changed_at[row_at - c.size.y]);
+                if (k < c.size.z - 1) last = std::max(last, changed_at[row_at + c.size.y]);
+                if (settled_at[row_at] >= last) continue;
+                ++visit;
+                bool moved = false;
                 const std::ptrdiff_t first = j * sy + k * sz;
                 float* row = u.data() + first;
                 const std::uint8_t* open_row = open.data() + first;
@@ -92,8 +105,10 @@ void march(const Cells& c, const std::vector<std::uint8_t>& open, CellField& u) 
                     const float nearer = upwind(x, y, z, h);
                     if (nearer >= row[i]) continue;
                     row[i] = nearer;
-                    changed = true;
+                    moved = true;
                 }
+                (moved ? changed_at : settled_at)[row_at] = visit;
+                changed = changed || moved;
             }
         }
     }

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Draws fixed frames for scripts/count-instructions, which runs this program under valgrind's
+// callgrind: a count of instructions is the same on a busy machine as on an idle one.
+//   sonocase_count BUNDLE
+// Counts from one request to the next are handed over under the name of what was counted. Without
+// valgrind the requests do nothing.
+#include <valgrind/callgrind.h>
+
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "formats/files/load_save.h"
+#include "formats/machine/machine.h"
+#include "runtime/engine/skin.h"
+#include "runtime/imaging/doppler/doppler_view.h"
+#include "runtime/imaging/renderer.h"
+#include "runtime/player/headless/run_headless.h"
+#include "runtime/tracking/scripted_sweep.h"
+
+// In place of Highway's own, which its library calls as it is loaded: that reads the time-stamp
+// counter by an instruction (rdtscp) that valgrind has on some machines alone. Nothing here asks.
+namespace hwy::platform {
+std::uint64_t TimerResolution();
+std::uint64_t TimerResolution() {
+    return 1;
+}
+}  // namespace hwy::platform
+
+namespace sonocase::bench {
+namespace {
+
+using namespace runtime;
+
+constexpr int kSize = 512;
+constexpr const char* kExercise = "liver-biopsy";
+
+void must(bool good, const std::string& what) {
+    if (good) return;
+    std::fprintf(stderr, "sonocase_count: %s\n", what.c_str());
+    std::exit(1);
+}
+
+// Counts the instructions of `work`; the script divides by `frames`.
+template <class F>
+void counted(const std::string& name, std::size_t frames, F&& work) {
+    const std::string label = name + " " + std::to_string(frames);
+    const char* text = label.c_str();
+    CALLGRIND_START_INSTRUMENTATION;
+    CALLGRIND_ZERO_STATS;
+    work();
+    CALLGRIND_DUMP_STATS_AT(text);
+    CALLGRIND_STOP_INSTRUMENTATION;
+}
+
+class Frames {
+  public:
+    explicit Frames(const std::string& path) : path_(path), bundle_(loaded(path)), skin_(bundle_) {
+        for (const EmbeddedExercise& embedded : bundle_.exercises) {
+            if (embedded.name != kExercise) continue;
+            auto exercise = parse_exercise(embedded.toml, embedded.name);
+            must(static_cast<bool>(exercise), "exercise");
+            exercise_ = std::move(*exercise);
+        }
+        must(exercise_.name == kExercise, path + " holds no exercise liver-biopsy");
+        textures_ = make_physical_textures();
+        for (const Sweep& sweep : exercise_.sweeps) {
+            if (sweep.keys.empty()) continue;
+            const double from = sweep.keys.front().time_s, to = sweep.keys.back().time_s;
+            for (const double part : {0.15, 0.4, 0.6})
+                poses_.push_back(input_at(sweep, from, to, part));
+        }
+        must(poses_.size() >= 4, "too few sweeps");
+    }
+
+    RenderOptions options(ImageModel model, const char* effects, const char* machine = "") const {
+        RenderOptions o;
+        o.model = model;
+        o.effects = {effects};
+        o.width_px = o.height_px = kSize;
+        o.textures = textures_;
+        if (machine[0] != 0) o.machine = *built_in_machine(machine);
+        return o;
+    }
+    const Exercise& exercise() const { return exercise_; }
+
+    // Frames of a probe that moves: each was drawn once before, in another order.
+    void frames(const std::string& name,
+                const Exercise& exercise,
+                const RenderOptions& o,
+                double press_mm = 0) {
+        Renderer renderer = made(exercise, o);
+        const auto all = [&] {
+            for (FrameInput input : poses_) {
+                input.settings.press_mm = press_mm;
+                renderer.render(input, pixels_);
+            }
+        };
+        all();
+        counted(name, poses_.size(), all);
+    }
+    void start(const std::string& name, const RenderOptions& o) {
+        counted(name, 1, [&] { made(exercise_, o).render(poses_.front(), pixels_); });
+    }
+    // What colour adds to a frame: a box about the widest vessel.
+    void colour(const std::string& name) {
+        const RenderOptions o = options(ImageModel::physical, "auto");
+        Renderer renderer = made(exercise_, o);
+        auto view = DopplerView::create(bundle_, exercise_, o);
+        must(static_cast<bool>(view) && view->has_flow(), "no flow");
+        std::vector<FrameInput> inputs = poses_;
+        const auto draw = [&](FrameInput& input) {
+            renderer.render(input, pixels_);
+            view->frame(input, renderer, pixels_);
+        };
+        for (FrameInput& input : inputs) {
+            input.settings.doppler.mode = DopplerMode::colour;
+            input.settings.doppler = view->aimed(input, input.settings.doppler);
+            draw(input);
+        }
+        counted(name, inputs.size(), [&] {
+            for (FrameInput& input : inputs) draw(input);
+        });
+    }
+    // The player without a window, from the file to the last of so many frames.
+    void headless(const std::string& name, int frames) {
+        PlayerArguments a;
+        a.bundle = path_;
+        a.exercise = kExercise;
+        a.headless = true;
+        a.tracker = "sweep:needle";
+        a.frames = frames;
+        counted(name, 1, [&] { must(static_cast<bool>(run_headless(a, 0)), "the player failed"); });
+    }
+
+  private:
+    static CaseBundle loaded(const std::string& path) {
+        auto bundle = load_bundle(path);
+        must(static_cast<bool>(bundle), path + " cannot be read");
+        return std::move(*bundle);
+    }
+    FrameInput input_at(const Sweep& sweep, double from, double to, double part) const {
+        const SweepPose pose = sweep_pose(sweep, from + part * (to - from), &skin_);
+        FrameInput input;
+        input.frame = static_cast<std::uint32_t>(poses_.size());
+        input.mannequin_from_probe = pose.mannequin_from_probe;
+        input.has_needle = pose.has_needle;
+        if (pose.has_needle) {
+            input.needle.tip = Point3{} + pose.mannequin_from_needle.translation;
+            input.needle.direction = pose.mannequin_from_needle.rotation.column(2);
+        }
+        return input;
+    }
+    Renderer made(const Exercise& exercise, const RenderOptions& o) const {
+        auto renderer = Renderer::create(bundle_, exercise, o);
+        must(static_cast<bool>(renderer), "no renderer");
+        return std::move(*renderer);
+    }
+
+    std::string path_;
+    CaseBundle bundle_;
+    Skin skin_;
+    Exercise exercise_;
+    std::shared_ptr<const PhysicalTextures> textures_;
+    std::vector<FrameInput> poses_;
+    std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(kSize * kSize);
+};
+
+void count_all(const std::string& path) {
+    Frames f(path);
+    const auto paper = ImageModel::paper, physical = ImageModel::physical;
+    f.frames("paper/at_rest", f.exercise(), f.options(paper, "-deformation"));
+    f.frames("paper", f.exercise(), f.options(paper, "auto"));
+    f.frames("paper/pressed_8_mm", f.exercise(), f.options(paper, "auto"), 8);
+    f.frames("physical/classic/at_rest", f.exercise(),
+             f.options(physical, "-deformation", "classic"));
+    f.frames("physical/modern/at_rest", f.exercise(),
+             f.options(physical, "-deformation", "modern"));
+    f.frames("physical/modern", f.exercise(), f.options(physical, "auto", "modern"));
+    f.frames("physical/modern/pressed_8_mm", f.exercise(), f.options(physical, "auto", "modern"),
+             8);
+    Exercise linear = f.exercise();
+    linear.probe.shape = ProbeShape::linear;
+    linear.probe.width_mm = 45;
+    linear.probe.depth_mm = 60;
+    linear.probe.frequency_mhz = 7.5;
+    linear.probe.focus_mm = 35;
+    linear.probe.elevation_mm = 2.5;
+    f.frames("physical/modern-linear/at_rest", linear,
+             f.options(physical, "-deformation", "modern-linear"));
+    f.colour("physical/colour");
+    f.start("first_frame/paper", f.options(paper, "auto"));
+    f.start("first_frame/physical", f.options(physical, "auto"));
+    f.headless("headless/1_frame", 1);
+    f.headless("headless/21_frames", 21);
+}
+
+}  // namespace
+}  // namespace sonocase::bench
+
+int main(int argc, char** argv) {
+    if (argc != 2) {
+        std::fprintf(stderr, "usage: sonocase_count BUNDLE\n");
+        return 2;
+    }
+    sonocase::bench::count_all(argv[1]);
+    return 0;
+}
