@@ -415,7 +415,13 @@ std::vector<RestPoint> find_rests(std::span<const Pose> poses,
 std::string misread_poses(std::span<const Pose> poses,
                           const PointFit& fit,
                           const PointOptions& options) {
-    constexpr double kPoorMm = 2;
+    constexpr double kPoorMm = 2, kFarMm = 500;
+    // A pivot of inverted poses is one too: tip and resting point change places.
+    if (fit.determined && norm(fit.tip_mm) > kFarMm &&
+        norm(fit.pivot_mm - Point3{}) < norm(fit.tip_mm) / 2)
+        return "the tip would lie " + calibrate::text("%.0f", norm(fit.tip_mm)) +
+               " mm from the sensor: the poses map the tracker to the tool; record the tool to the "
+               "tracker";
     const bool most = 2 * fit.inliers > fit.poses;
     if (fit.determined && most && fit.rms_mm <= kPoorMm) return {};
     const auto quaternion_shifted = [](const Rigid& p) {

@@ -10,6 +10,7 @@
 #include <optional>
 #include <utility>
 
+#include "formats/recording/tool_frames.h"
 #include "formats/text/number_text.h"
 
 namespace sonocase {
@@ -23,6 +24,18 @@ constexpr std::size_t kMaxTools = 64;
 
 // The same columns by other names, as other programs write them.
 constexpr std::pair<std::string_view, std::string_view> kOtherNames[] = {
+    {"m00", "r00"},
+    {"m01", "r01"},
+    {"m02", "r02"},
+    {"m10", "r10"},
+    {"m11", "r11"},
+    {"m12", "r12"},
+    {"m20", "r20"},
+    {"m21", "r21"},
+    {"m22", "r22"},
+    {"m03", "tx"},
+    {"m13", "ty"},
+    {"m23", "tz"},
     {"timestamp", "timestamp_s"},
     {"time", "timestamp_s"},
     {"time_s", "timestamp_s"},
@@ -331,6 +344,12 @@ class LayoutReader {
                 if (!known && layout_.tools.size() < kMaxTools) layout_.tools.push_back(*one);
             }
         }
+        // The one prefix of a table may be a path that names no tool: field.pose.position.x.
+        if (layout_.tools.size() == 1) {
+            std::string& name = layout_.tools.front().tool;
+            if (rank_as_tool(name, ToolRole::probe) + rank_as_tool(name, ToolRole::needle) == 0)
+                name.clear();
+        }
         return !layout_.tools.empty();
     }
     // Names behind a prefix as those without one: "probe_x" is "probe_tx".
@@ -437,7 +456,11 @@ class RowReader {
         if (c.frame >= 0 && !parse_number(cell(c.frame), pose.frame))
             return not_a_number(c.frame, "frame");
         if (c.time >= 0) {
-            if (!number_at(c.time, pose.timestamp_s)) return not_a_number(c.time, "timestamp_s");
+            if (!number_at(c.time, pose.timestamp_s)) {
+                Error fault = not_a_number(c.time, "timestamp_s");
+                fault.expected = "times must be numbers of seconds, or time_ms of milliseconds";
+                return fault;
+            }
             pose.timestamp_s *= layout_.time_unit_s;
         }
         const State state = c.status < 0 ? State::counts : state_of(cell(c.status));
@@ -484,7 +507,8 @@ class RowReader {
         // Four printed decimals are off by less; other lengths are no rotation.
         if (pose.ok && std::isfinite(length) && !(std::abs(length - 1) < 1e-3))
             return Error{"the quaternion has length " + number_text(length, 4), here(),
-                         "expected 1: name the scalar qw and the others qx, qy, qz"};
+                         "expected 1: name the scalar qw and the others qx, qy, qz, and write four "
+                         "decimals and more"};
         to.rotation = rotation_from_quaternion(
             {values[3] / length, values[4] / length, values[5] / length, values[6] / length});
         return Done{};
@@ -644,7 +668,7 @@ Result<std::vector<ToolReadings>> parse_pose_table(std::string_view text,
         const bool remark = line.front() == '#' || line.front() == '%';
         if (remark) line = trimmed(line.substr(1));
         LayoutReader reader(line, at);
-        if (remark && !reader.names_columns()) continue;
+        if (remark && !reader.names_columns() && !LayoutReader(line, at).read()) continue;
         std::vector<std::string_view> cells;
         split(line, separator_of(line), cells);
         double first = 0;

@@ -468,8 +468,10 @@ Status Reader::read_number(const HeaderLine& line, double& to) const {
 constexpr double kRefused = 2;
 
 Status Reader::read_transform_status(const HeaderLine& line, SequencePose& pose) {
-    pose.ok = pose.ok && line.value == "OK";
-    if (line.value != "OK") pose.to_from[15] = kRefused;
+    const bool ok = line.value == "OK" || line.value == "ok" || line.value == "Ok" ||
+                    line.value == "VALID" || line.value == "TOOL_OK";
+    pose.ok = pose.ok && ok;
+    if (!ok) pose.to_from[15] = kRefused;
     return Done{};
 }
 
@@ -482,8 +484,9 @@ Status Reader::read_transform(const HeaderLine& line, SequencePose& pose) {
     }
     for (std::size_t i = 0; i < 16; ++i) {
         if (!parse_number(words[i], pose.to_from[i])) {
-            return fault("'" + std::string(words[i].substr(0, 30)) + "' is not a number", "",
-                         line.number);
+            const bool comma = words[i].find(',') != std::string_view::npos;
+            return fault("'" + std::string(words[i].substr(0, 30)) + "' is not a number",
+                         comma ? "write decimal points" : "expected 16 numbers", line.number);
         }
     }
     pose.ok = !refused;

@@ -242,6 +242,11 @@ Result<Session> session_from_sequence(const Sequence& sequence,
         any = any || sample.probe_ok || sample.needle_ok;
         session.samples.push_back(std::move(sample));
     }
+    if (names.probe.empty() && names.needle.empty() && !sequence.transforms.empty()) {
+        for (const std::string& name : sequence.transforms)
+            session.no_pose += (session.no_pose.empty() ? "" : ", ") + name;
+        session.no_pose += " name neither; say which is which, as with --probe and --needle";
+    }
     for (const int index : {probe, needle}) {
         if (any || index < 0) continue;
         const std::string why = why_no_pose(sequence, index);
@@ -299,7 +304,7 @@ std::uint64_t attempt_seed(const SessionHeader& header) {
 }
 
 Status check_session(const Session& session, const std::string& where) {
-    constexpr double kMetres = 2;  // no torso is that small in mm or that large in m
+    constexpr double kMetres = 10;  // no torso is that small in mm or that large in m
     if (session.samples.empty()) return Done{};
     long poses = 0;
     double farthest = 0;

@@ -54,7 +54,7 @@ std::vector<Link> chain_between(const Sequence& sequence,
 
 // A tool of several names; the first match by words that stand at the beginning counts most.
 constexpr std::string_view kProbeWords[] = {"probe", "transducer", "ultrasound", "usprobe"};
-constexpr std::string_view kNeedleWords[] = {"needle", "stylus"};
+constexpr std::string_view kNeedleWords[] = {"needle", "stylus", "pointer"};
 
 }  // namespace
 

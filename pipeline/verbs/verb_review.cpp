@@ -3,11 +3,13 @@
 // sonocase review, score and progress: pages, scores and results of recorded sessions.
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
 
 #include "formats/files/atomic_file.h"
 #include "formats/files/load_save.h"
 #include "formats/files/thread_jobs.h"
 #include "formats/scoring/draw_attempt.h"
+#include "formats/text/json_reader.h"
 #include "pipeline/import/mesh/surface_file.h"
 #include "pipeline/review/review.h"
 #include "pipeline/verbs/verb_common.h"
@@ -113,6 +115,8 @@ int verb_score(int argc, char** argv) {
         return session_from_sequence(sequence, names, a.session);
     }();
     if (!session) return fail("score", session.error());
+    if (session->samples.empty())
+        return fail("score", Error{"holds no reading", a.session, "expected poses with times"});
     if (const auto status = check_session(*session, a.session); !status)
         return fail("score", status.error());
     for (const Message& note : session->notes)
@@ -159,6 +163,38 @@ int verb_score(int argc, char** argv) {
     return kDone;
 }
 
+namespace {
+
+// A session whose scores the player kept beside its recording, because the book could not be
+// written: RECORDING.scores.json.
+Result<ProgressEntry> kept_entry(const std::string& path) {
+    const std::string ending = ".scores.json";
+    if (!path.ends_with(ending))
+        return Error{"is not a file of kept scores", path, "expected RECORDING.scores.json"};
+    const std::string recording = path.substr(0, path.size() - ending.size());
+    SONOCASE_TRY(const Sequence sequence, load_recording_file(recording));
+    SONOCASE_TRY(const Session session,
+                 session_from_sequence(sequence, guess_names(sequence), recording));
+    if (session.header.trainee.empty())
+        return Error{"names no trainee", recording, "only sessions of a trainee are kept"};
+    SONOCASE_TRY(const std::string text, read_text_file(path));
+    detail::Json scores;
+    detail::JsonFault fault{path, {}};
+    if (!detail::parse_json(text, scores, fault)) return *fault.error;
+    if (!scores.is_object() || !scores.contains("metrics") || !scores["metrics"].is_object())
+        return Error{"holds no metrics", path, "expected what sonoplay wrote beside a recording"};
+    SessionScore score;
+    score.passed = scores.value("passed", false);
+    for (const auto& [name, value] : scores["metrics"].items()) {
+        if (value.is_number()) score.metrics.push_back({name, value.get<double>()});
+    }
+    std::error_code failed;
+    const std::string whole = std::filesystem::absolute(recording, failed).string();
+    return progress_entry(session.header, score, failed ? recording : whole);
+}
+
+}  // namespace
+
 int verb_progress(int argc, char** argv) {
     CLI::App app("What trainees have done so far: list, export, remove");
     std::string path = default_progress_path(), trainee, exercise, csv, remove;
@@ -168,6 +204,11 @@ int verb_progress(int argc, char** argv) {
         ->capture_default_str();
     app.add_option("--trainee", trainee, "Only this one");
     app.add_option("--exercise", exercise, "Only this one");
+    std::vector<std::string> kept;
+    app.add_option("--add", kept,
+                   "Add sessions whose scores were kept beside their recordings, because the book "
+                   "could not be written")
+        ->type_name("RECORDING.scores.json");
     app.add_option("--csv", csv, "Write the sessions with all scores")->type_name("FILE.csv");
     app.add_option("--remove", remove, "Remove a trainee with all sessions and recordings")
         ->type_name("NAME");
@@ -175,6 +216,14 @@ int verb_progress(int argc, char** argv) {
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
     auto book = ProgressBook::open(path);
     if (!book) return fail("progress", book.error());
+    for (const std::string& file : kept) {
+        const auto entry = kept_entry(file);
+        if (!entry) return fail("progress", entry.error());
+        if (auto s = book->add(*entry); !s) return fail("progress", s.error());
+        std::printf("added %s: %s, %s\n", entry->started.c_str(), entry->trainee.c_str(),
+                    entry->exercise.c_str());
+    }
+    if (!kept.empty()) return kDone;
     if (!remove.empty()) {
         std::vector<std::string> left;
         if (auto s = book->remove_trainee(remove, &left); !s) return fail("progress", s.error());

@@ -153,7 +153,7 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
                    "File of a calibration or a lag; may be repeated")
         ->allow_extra_args(false);
     app.add_option("--tool", arguments.tools,
-                   "Which transform of an OpenIGTLink stream is which tool: "
+                   "Which transform of an OpenIGTLink stream or recording is which tool: "
                    "probe|needle|reference=NAME; may be repeated. Default: by the names")
         ->type_name("ROLE=NAME")
         ->allow_extra_args(false);

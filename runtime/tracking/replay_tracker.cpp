@@ -76,6 +76,17 @@ bool to_mannequin(std::string_view transform) {
     return split_transform_name(transform).to == "Mannequin";
 }
 
+// Of a transform that is nobody's: it may be the needle under another name.
+bool may_be_a_tool(const std::string& transform) {
+    const TransformName name = split_transform_name(transform);
+    const bool reference = name.from == "Reference" || name.from == "Tracker" ||
+                           name.from == "Mannequin" || name.to == "Image";
+    // What ends in a tool is a calibration.
+    const std::string ends(name.to);
+    return !reference && rank_as_tool(transform, ToolRole::probe) == 0 &&
+           rank_as_tool(ends, ToolRole::probe) == 0 && rank_as_tool(ends, ToolRole::needle) == 0;
+}
+
 // The transform that the user named for a role: whole, with or without "Transform", or its tool
 // alone. -2: the role was given no name; an Error: the recording has none of that name.
 Result<int> transform_of_role(const Sequence& sequence,
@@ -274,10 +285,22 @@ Result<Recording> load_recording(const std::string& files,
     const std::size_t readings = recording.probe.size() + recording.needle.size();
     const std::size_t dropped = drop_falling(recording.probe) + drop_falling(recording.needle);
     if (recording.probe.empty()) return Error{"holds no time that is a number", files, ""};
+    if (2 * dropped > readings)
+        return Error{"the times of " + std::to_string(dropped) + " of " + std::to_string(readings) +
+                         " readings fall or are no numbers",
+                     files, "expected readings in the order of their times, in seconds"};
     if (dropped > 0)
         sequence.notes.push_back(
             {"{} of {} readings were left out, because their time fell or was no number.",
              {std::to_string(dropped), std::to_string(readings)}});
+    if (needle.empty()) {
+        for (const std::string& name : sequence.transforms) {
+            if (name == probe || !may_be_a_tool(name)) continue;
+            sequence.notes.push_back(
+                {"{} is not played: if it is the needle, say --tool needle={}.", {name, name}});
+            break;
+        }
+    }
     for (const Message& note : sequence.notes)
         recording.note = recording.note.empty() ? note : Message("{} {}", {recording.note, note});
     if (!recording.needle.empty()) {

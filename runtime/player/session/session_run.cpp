@@ -148,11 +148,14 @@ Result<SessionScore> SessionRun::finish() {
         if (!book || !kept) {
             const std::string beside = path_ + ".scores.json";
             const Status written = write_file(beside, score_json(score, exercise_));
-            not_kept_ = Message("The session was not put into the progress book: {}. {}",
-                                {(book ? kept.error() : book.error()).message(),
-                                 written ? Message("Its scores are in {}.", {beside})
-                                         : Message("Its scores were not kept either: {}.",
-                                                   {written.error().message()})});
+            not_kept_ = Message(
+                "The session was not put into the progress book: {}. {}",
+                {(book ? kept.error() : book.error()).message(),
+                 written ? Message("Its scores are in {}; add them later: sonocase progress "
+                                   "--add {}",
+                                   {beside, beside})
+                         : Message("Its scores were not kept either: {}.",
+                                   {written.error().message()})});
             score.warnings.push_back(not_kept_);
         }
     }

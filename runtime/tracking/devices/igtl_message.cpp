@@ -163,7 +163,9 @@ void mark_lost(std::span<const std::uint8_t> metadata, std::vector<NamedPose>& p
     each_entry(metadata, [&](std::string_view key, std::string_view value) {
         if (!key.ends_with("Status") && !key.ends_with("status")) return;
         while (!value.empty() && (value.back() == ' ' || value.back() == 0)) value.remove_suffix(1);
-        if (value == "OK" || value == "ok" || value == "VALID" || value.empty()) return;
+        if (value == "OK" || value == "ok" || value == "Ok" || value == "VALID" ||
+            value == "TOOL_OK" || value.empty())
+            return;
         key.remove_suffix(6);
         for (NamedPose& pose : poses) {
             if (key.empty() || key == "Transform" || key == pose.name ||

@@ -12,6 +12,37 @@
 namespace sonocase {
 namespace {
 
+// Rotations written column by column, poses that map the tracker to the tool, a quaternion read in
+// another order: the pivot fits badly, or its tip lies where no tool has one, and it is said why.
+TEST(PointTrouble, PosesReadTheWrongWayAreNamed) {
+    std::vector<Pose> poses;
+    const Vector3 tip{5, -3, -120};
+    for (int i = 0; i < 200; ++i) {
+        const double t = 0.07 * i;
+        const Matrix3 turn =
+            rotation_about({std::cos(0.7 * t), std::sin(0.7 * t), 0}, 0.6 * std::sin(0.31 * t)) *
+            rotation_about({0, 0, 1}, 0.9 * std::sin(0.2 * t));
+        poses.push_back({i, t, true, Rigid{turn, Vector3{100, 50, -900} - turn * tip}});
+    }
+    const auto said = [&](auto change) {
+        std::vector<Pose> changed = poses;
+        for (Pose& pose : changed) pose.tracker_from_tool = change(pose.tracker_from_tool);
+        return misread_poses(changed, fit_point(changed));
+    };
+    EXPECT_EQ(said([](const Rigid& p) { return p; }), "");
+    EXPECT_NE(said([](const Rigid& p) {
+                  return Rigid{transpose(p.rotation), p.translation};
+              }).find("column by column"),
+              std::string::npos);
+    EXPECT_NE(said([](const Rigid& p) { return inverse(p); }).find("tracker to the tool"),
+              std::string::npos);
+    EXPECT_NE(said([](const Rigid& p) {
+                  const Quaternion q = quaternion_from_rotation(p.rotation);
+                  return Rigid{rotation_from_quaternion({q.x, q.y, q.z, q.w}), p.translation};
+              }).find("qx,qy,qz,qw"),
+              std::string::npos);
+}
+
 using testing::pivot_recording;
 using testing::PivotMotion;
 using testing::Random;

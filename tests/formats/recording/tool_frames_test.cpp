@@ -285,6 +285,31 @@ TEST(PoseTables, WhatIsNoTableIsNamed) {
     EXPECT_TRUE((*ns)[0].ok);
 }
 
+// What others call things.
+TEST(PoseTables, OtherNamesAreUnderstood) {
+    const auto read_one = [](const std::string& text) {
+        const auto read = parse_pose_table(text, "p");
+        return read && read->size() == 1 ? read->front() : ToolReadings{"none", {}};
+    };
+    const ToolReadings ros = read_one(
+        "%time,field.header.seq,field.pose.position.x,field.pose.position.y,field.pose.position.z,"
+        "field.pose.orientation.x,field.pose.orientation.y,field.pose.orientation.z,"
+        "field.pose.orientation.w\n0.5,1,1,2,3,0,0,0,1\n");
+    EXPECT_EQ(ros.name, "");
+    ASSERT_EQ(ros.poses.size(), 1u);
+    EXPECT_EQ(ros.poses[0].tracker_from_tool.translation, (Vector3{1, 2, 3}));
+    EXPECT_EQ(ros.poses[0].timestamp_s, 0.5);
+    const ToolReadings matrix = read_one(
+        "time_s,m00,m01,m02,m03,m10,m11,m12,m13,m20,m21,m22,m23\n0,0,-1,0,4,1,0,0,5,0,0,1,6\n");
+    ASSERT_EQ(matrix.poses.size(), 1u);
+    EXPECT_EQ(matrix.poses[0].tracker_from_tool.translation, (Vector3{4, 5, 6}));
+    EXPECT_EQ(matrix.poses[0].tracker_from_tool.rotation(1, 0), 1);
+    const auto date = parse_pose_table(
+        "timestamp,tx,ty,tz,qw,qx,qy,qz\n2024-05-01T12:00:00,1,2,3,1,0,0,0\n", "p");
+    ASSERT_FALSE(date);
+    EXPECT_NE(date.error().message().find("numbers of seconds"), std::string::npos);
+}
+
 TEST(PoseTables, TimesThatTellNothingAreRefused) {
     std::vector<double> same(40, 7.0), ms, coarse, good;
     for (int i = 0; i < 40; ++i) {

@@ -65,10 +65,11 @@ TEST(ReplayTracker, ACalibratedLagBringsTheNeedleToItsOwnMoment) {
     }
 }
 
-std::string table(int rows, double start_s, double scale, double fall_at = -1) {
+std::string table(
+    int rows, double start_s, double scale, double fall_at = -1, double step_s = 0.05) {
     std::string text = "frame,timestamp_s,status,tx,ty,tz,r00,r01,r02,r10,r11,r12,r20,r21,r22\n";
     for (int i = 0; i < rows; ++i) {
-        const double t = start_s + 0.05 * i - (i == fall_at ? 1 : 0);
+        const double t = start_s + step_s * i - (i == fall_at ? 1 : 0);
         text += std::to_string(i) + "," + std::to_string(t) + ",OK," +
                 std::to_string(scale * (100 + i)) + ",0,0,1,0,0,0,1,0,0,0,1\n";
     }
@@ -122,6 +123,35 @@ TEST(ReplayTracker, SaysWhatItLeavesOutAndRefusesMetresAndNoTimes) {
         folder.write("n.csv", "tx,ty,tz,qw,qx,qy,qz\n1,2,300,1,0,0,0\n1,2,301,1,0,0,0\n"));
     ASSERT_FALSE(timeless);
     EXPECT_NE(timeless.error().message().find("no times"), std::string::npos);
+    const auto backwards = load_recording(folder.write("b.csv", table(50, 9, 1, -1, -0.05)));
+    ASSERT_FALSE(backwards);
+    EXPECT_NE(backwards.error().message().find("fall"), std::string::npos);
+}
+
+// Names of tools and of a reference, given as on the command line, hold for recordings too.
+TEST(ReplayTracker, TakesToolsAndAReferenceByName) {
+    const sonocase::testing::TemporaryFolder folder;
+    std::string text = "timestamp_s,tool,tx,ty,tz,qw,qx,qy,qz\n";
+    for (int i = 0; i < 20; ++i) {
+        const std::string t = std::to_string(0.05 * i);
+        text += t + ",0A," + std::to_string(100 + i) + ",0,300,1,0,0,0\n";
+        text += t + ",0B," + std::to_string(200 + i) + ",0,300,1,0,0,0\n";
+        text += t + ",0C," + std::to_string(10 + i) + ",0,200,1,0,0,0\n";
+    }
+    const std::string file = folder.write("handles.csv", text);
+    const auto unnamed = load_recording(file);
+    ASSERT_FALSE(unnamed);
+    EXPECT_NE(unnamed.error().message().find("--tool probe="), std::string::npos);
+    const auto named =
+        load_recording(file, 0, {{"probe", "0A"}, {"needle", "0B"}, {"reference", "0C"}});
+    ASSERT_TRUE(named) << named.error().message();
+    ASSERT_EQ(named->probe.size(), 20u);
+    EXPECT_NEAR(named->probe[7].tracker_from_tool.translation.x, 90, 1e-9);
+    EXPECT_NEAR(named->needle[7].tracker_from_tool.translation.x, 190, 1e-9);
+    EXPECT_NEAR(named->needle[7].tracker_from_tool.translation.z, 100, 1e-9);
+    const auto wrong = load_recording(file, 0, {{"probe", "0Z"}});
+    ASSERT_FALSE(wrong);
+    EXPECT_NE(wrong.error().message().find("0AToTracker"), std::string::npos);
 }
 
 TEST(PacedTracker, RunsSlowerFasterStandsStillAndJumps) {
