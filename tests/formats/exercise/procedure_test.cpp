@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Reading of procedures: what makes no sense is refused with file and line. Acts as text.
+#include "formats/exercise/procedure.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "formats/exercise/exercise.h"
+#include "formats/volume/label_volume.h"
+
+namespace sonocase {
+namespace {
+
+constexpr const char* kHead = "name = \"x\"\n";
+constexpr const char* kLook =
+    "[[steps]]\nname = \"look\"\ndone = { shows = \"liver\", hold_s = 1 }\n";
+
+std::string fault_of(const std::string& lines) {
+    const auto exercise = parse_exercise(kHead + lines, "x.toml");
+    return exercise ? "" : exercise.error().message();
+}
+
+void expect_fault(const std::string& lines, int line, const std::string& words) {
+    const std::string fault = fault_of(lines);
+    EXPECT_NE(fault.find("x.toml:" + std::to_string(line)), std::string::npos) << fault;
+    EXPECT_NE(fault.find(words), std::string::npos) << fault;
+}
+
+TEST(ReadProcedure, TakesStepsItemsAndCut) {
+    const auto exercise = parse_exercise(
+        std::string(kHead) + kLook +
+            "[[items]]\nname = \"seen\"\ncritical = true\nweight = 2\nstep = \"look\"\n"
+            "[procedure]\ncut = 2\n",
+        "x.toml");
+    ASSERT_TRUE(exercise) << exercise.error().message();
+    const Procedure& p = exercise->procedure;
+    ASSERT_EQ(p.steps.size(), 1u);
+    ASSERT_EQ(p.items.size(), 1u);
+    EXPECT_EQ(p.items[0].step, 0);
+    EXPECT_TRUE(p.items[0].critical);
+    EXPECT_EQ(p.points(), 2);
+    EXPECT_FALSE(parse_exercise(kHead, "x.toml")->procedure.given());
+}
+
+TEST(ReadProcedure, RefusesWhatMakesNoSense) {
+    const std::string look = kLook;
+    expect_fault("[[steps]]\nname = \"a\"\n", 2, "can never end");
+    expect_fault(look + look, 6, "given twice");
+    expect_fault("[[steps]]\nname = \"a\"\ndone = { needle_in = false, tip_in = \"liver\" }\n", 4,
+                 "never holds");
+    expect_fault(
+        "[[steps]]\nname = \"a\"\nentry = { needle_in = true }\ndone = { needle_in = true }\n", 5,
+        "ends before it begins");
+    expect_fault(
+        "[[steps]]\nname = \"a\"\nentry = { step = \"b\" }\ndone = { needle_in = true }\n", 4,
+        "is not an earlier step");
+    expect_fault(look + "[[items]]\nname = \"i\"\nstep = \"lok\"\n", 7, "did you mean 'look'?");
+    expect_fault(look + "[[items]]\nname = \"i\"\n", 6, "has no rule");
+    expect_fault(look + "[[items]]\nname = \"i\"\nstep = \"look\"\n[procedure]\ncut = 2\n", 9,
+                 "above the sum of all weights");
+    expect_fault("[[steps]]\nname = \"a\"\ndone = { act = \"injekt\" }\n", 4, "injekt");
+}
+
+TEST(ReadProcedure, FindsARegionThatTheCaseLacks) {
+    const auto exercise = parse_exercise(std::string(kHead) + kLook, "x.toml");
+    ASSERT_TRUE(exercise);
+    Label outside, liver, lung;
+    liver.name = "liver";
+    lung.name = "lung_lower_lobe_right";
+    EXPECT_EQ(unknown_region(*exercise, {outside, liver}), "");
+    EXPECT_EQ(unknown_region(*exercise, {outside, lung}), "liver");
+    EXPECT_TRUE(region_names_label("lung*", lung.name));
+    EXPECT_FALSE(region_names_label("lung", lung.name));
+}
+
+TEST(Acts, ComeBackFromTheirText) {
+    ActList acts;
+    acts.add({ActKind::inject, 0, 2.5});
+    acts.add({ActKind::answer, 3, 1});
+    EXPECT_EQ(acts_text(acts), "inject=2.5;answer:3=1");
+    EXPECT_EQ(acts_of(acts_text(acts)), acts);
+}
+
+TEST(Acts, WhatCannotBeReadIsLeftOutAndNamed) {
+    for (const std::string bad : {"injekt=1", "inject=x", "inject=nan", "answer:-1=0", "=3"}) {
+        std::string unread;
+        EXPECT_EQ(acts_of("drain=4;" + bad, &unread).count, 1) << bad;
+        EXPECT_EQ(unread, bad);
+    }
+    EXPECT_EQ(acts_of("").count, 0);
+    EXPECT_EQ(acts_of("drain=1;drain=1;drain=1;drain=1;drain=1").count, ActList::kMaxActs);
+}
+
+}  // namespace
+}  // namespace sonocase
