@@ -650,10 +650,9 @@ void ProcedureRun::update(double time_s,
         }
         if (f.probe_ok && f.depth_mm > 0) {
             const Rigid probe_from = inverse(f.probe);
-            f.tip_in_view = sight_.tip_visible(f.probe, probe_from * f.tip,
-                                               probe_from.rotation * f.direction,
-                                               probe_from.rotation * f.needle.rotation.column(0),
-                                               time_s);
+            f.tip_in_view =
+                sight_.tip_visible(f.probe, probe_from * f.tip, probe_from.rotation * f.direction,
+                                   probe_from.rotation * f.needle.rotation.column(0), time_s);
         }
     }
     if (f.probe_ok && anatomy_) f.on_skin = probe_on_skin(*anatomy_, probe_, f.probe);

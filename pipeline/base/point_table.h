@@ -41,9 +41,9 @@ struct PointTableOptions {
 // Rows that a column status, state, valid or tracked calls bad have no position, nor have those of
 // 0, 0, 0 where there are several, and of numbers beyond 1e12 (NDI).
 //
-// Errors name file and line: text that is not UTF-8; rows of two sensors by a column of that name; columns whose meaning is not certain, with the
-// meanings that are possible and the line to add; rows that do not hold what the others hold; a
-// file that holds fewer points than it says.
+// Errors name file and line: text that is not UTF-8; rows of two sensors by a column of that name;
+// columns whose meaning is not certain, with the meanings that are possible and the line to add;
+// rows that do not hold what the others hold; a file that holds fewer points than it says.
 Result<PointTable> parse_point_table(std::string_view text,
                                      const std::string& where,
                                      const PointTableOptions& options = {});

@@ -53,9 +53,8 @@ TEST(ReadProcedure, RefusesWhatMakesNoSense) {
     expect_fault(
         "[[steps]]\nname = \"a\"\nentry = { needle_in = true }\ndone = { needle_in = true }\n", 5,
         "ends before it begins");
-    expect_fault(
-        "[[steps]]\nname = \"a\"\nentry = { step = \"b\" }\ndone = { needle_in = true }\n", 4,
-        "is not an earlier step");
+    expect_fault("[[steps]]\nname = \"a\"\nentry = { step = \"b\" }\ndone = { needle_in = true }\n",
+                 4, "is not an earlier step");
     expect_fault(look + "[[items]]\nname = \"i\"\nstep = \"lok\"\n", 7, "did you mean 'look'?");
     expect_fault(look + "[[items]]\nname = \"i\"\n", 6, "has no rule");
     expect_fault(look + "[[items]]\nname = \"i\"\nstep = \"look\"\n[procedure]\ncut = 2\n", 9,

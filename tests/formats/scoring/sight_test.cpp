@@ -80,6 +80,8 @@ Exercise with_linear_probe() {
     return exercise;
 }
 
+constexpr Vector3 kBevel{0, 0, -1};  // towards the probe
+
 TEST(NeedleSight, LengthInTheShadowDoesNotCount) {
     const Rib rib;
     const NeedleSight sight(&rib, with_linear_probe());
@@ -88,7 +90,7 @@ TEST(NeedleSight, LengthInTheShadowDoesNotCount) {
     // points every second millimetre is tried.
     const double seen = sight.visible_mm(down(0), {-30, 0, 40}, {30, 0, 40}, 0);
     EXPECT_NEAR(seen, 60 - 8 + 4, 2.1);
-    EXPECT_LT(sight.contrast(down(0), {10, 0, 40}, {1, 0, 0}, 20, 0), NeedleSight::kShownGrey);
+    EXPECT_LT(sight.contrast(down(0), {10, 0, 40}, {1, 0, 0}, kBevel, 20, 0), NeedleSight::kShownGrey);
     EXPECT_DOUBLE_EQ(sight.visible_mm(down(0), {-30, 0, 12}, {30, 0, 12}, 0), 60);
     EXPECT_EQ(sight.visible_mm(down(0), {-30, 4, 12}, {30, 4, 12}, 0), 0);  // beside the plane
 }
@@ -123,7 +125,7 @@ TEST(NeedleSight, AMirrorShowsInAWeakShadowAndAnObliqueShaftDoesNot) {
     const Plate plate;
     const NeedleSight sight(&plate, with_linear_probe());
     const auto shows = [&](Vector3 axis) {
-        return sight.contrast(down(0), {0, 0, 40}, axis, 20, 0) >= NeedleSight::kShownGrey;
+        return sight.contrast(down(0), {0, 0, 40}, axis, kBevel, 20, 0) >= NeedleSight::kShownGrey;
     };
     EXPECT_TRUE(shows({1, 0, 0}));
     EXPECT_FALSE(shows(normalized({1, 0, 2})));

@@ -195,8 +195,9 @@ TEST(NeedleMakes, ShowInTissueAsMeasured) {
 }
 
 // Measures; not a bar that holds yet: the lobe is 5 degrees narrower than in tissue (chiba 19.8,
-// trocar 18.7). The same law, nothing fitted here. The gain is turned down by what the time gain adds over the
-// loss at the middle of the shaft, as for a bath of water: 2 (0.72 - 0.23) dB/cm/MHz, 3 cm, 8 MHz.
+// trocar 18.7). The same law, nothing fitted here. The gain is turned down by what the time gain
+// adds over the loss at the middle of the shaft, as for a bath of water: 2 (0.72 - 0.23)
+// dB/cm/MHz, 3 cm, 8 MHz.
 constexpr double kWaterGainDb = -23.5;
 TEST(NeedleMakes, DISABLED_ShowInWaterAsMeasured) {
     const CaseBundle bundle = water();
