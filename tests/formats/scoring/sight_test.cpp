@@ -90,7 +90,8 @@ TEST(NeedleSight, LengthInTheShadowDoesNotCount) {
     // points every second millimetre is tried.
     const double seen = sight.visible_mm(down(0), {-30, 0, 40}, {30, 0, 40}, 0);
     EXPECT_NEAR(seen, 60 - 8 + 4, 2.1);
-    EXPECT_LT(sight.contrast(down(0), {10, 0, 40}, {1, 0, 0}, kBevel, 20, 0), NeedleSight::kShownGrey);
+    EXPECT_LT(sight.contrast(down(0), {10, 0, 40}, {1, 0, 0}, kBevel, 20, 0),
+              NeedleSight::kShownGrey);
     EXPECT_DOUBLE_EQ(sight.visible_mm(down(0), {-30, 0, 12}, {30, 0, 12}, 0), 60);
     EXPECT_EQ(sight.visible_mm(down(0), {-30, 4, 12}, {30, 4, 12}, 0), 0);  // beside the plane
 }
