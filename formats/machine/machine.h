@@ -49,8 +49,6 @@ struct MachineLooks {
     bool operator==(const MachineLooks&) const = default;
 };
 
-// The exponent is such that a picture that opens with some 98 grey in its organs has the living
-// sweep's contrast of detail once brightness is matched: with 0.75 it had two thirds too much.
 // power: grey = floor + level e^exponent; above the grey `knee` the slope is multiplied by
 // knee_slope. log:   grey = level + 255 / dynamic_range_db * 20 log10(e), not below floor.
 enum class GreyMap { power, log };
@@ -58,7 +56,7 @@ struct MachineGrey {
     GreyMap map = GreyMap::power;
     double floor = 9;              // the machine's own black, [0, 255]
     double level = 56;             // of e = 1; power: above the floor; [1, 255]
-    double exponent = 0.5;         // power only, [0.05, 4]
+    double exponent = 0.75;        // power only, [0.05, 4]
     double knee = 160;             // power only; 255: none; [1, 255]
     double knee_slope = 0.5;       // [0, 1]
     double dynamic_range_db = 60;  // log; for both maps, where the console's knob starts; [20, 120]

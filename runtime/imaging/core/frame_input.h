@@ -66,11 +66,11 @@ struct ImageSettings {
 struct NeedlePose {
     Point3 tip;         // `mannequin` frame
     Vector3 direction;  // unit, hub to tip
-    // Unit, at right angles to the shaft: the side that the bevel faces. Zero: towards the probe.
-    Vector3 bevel;
     // How far it pushes the layer before its tip and drags tissue along its shaft
     // (runtime/imaging/core/needle_shift.h). Effect deformation draws both.
     double tent_mm = 0, drag_mm = 0;
+    // Unit, at right angles to the shaft: the side that the bevel faces. Zero: towards the probe.
+    Vector3 bevel = {};
 };
 
 struct FrameInput {
