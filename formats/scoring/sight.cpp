@@ -100,7 +100,7 @@ constexpr double kBoneFloor = 0.075, kBoneFade = 0.98895, kGasTail = 1.4, kGasFa
 constexpr double kApertureMm = 17, kPenumbraMm = 90;
 // A needle is thicker than a pulse: its echo, relative to liver's, grows with the roots of its
 // diameter, mm, and of the frequency, MHz.
-constexpr double kNeedleEcho = 8, kOwnShade = 0.35;
+constexpr double kNeedleEcho = 7.5, kOwnShade = 0.5;
 constexpr double kLn2 = 0.69314718055994531;
 constexpr double kLiverGrey = 80;
 
