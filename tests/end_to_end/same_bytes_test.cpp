@@ -27,13 +27,13 @@ using sonocase::testing::run_command;
 
 // Bundles: since the quadratic starts from the rigid pose. Physical frames: since pictures open
 // bright. Paper frames: of these bundles and of scripts that keep clear of ribs.
-constexpr const char* kDraft = "c6ae7c88e65c01d57f8339f129005d9f";
-constexpr const char* kBalanced = "c328d27cc906783b8b19aa1b625a5d21";
-constexpr const char* kSlender = "2fff78b44b130cb62179f98079c87f1d";
-constexpr const char* kReal = "a15170d7565c73b8a8b1a03f86a1113e";
-constexpr const char* kDraftPhysical = "027ac9ab83e003fe77d9803c6b449907";
+constexpr const char* kDraft = "6bf9a8ee03934733ed47e01c367b8b98";
+constexpr const char* kBalanced = "04b50aec14f46b23dde9658295ce7494";
+constexpr const char* kSlender = "a37d2566532f9f8bb2c22b8911936f26";
+constexpr const char* kReal = "1e286110ef6a985496a9c4efa77a28b6";
+constexpr const char* kDraftPhysical = "04c513a0c724f5b01a7f9aee8143b092";
 constexpr const char* kDraftPaper = "f39d1b64d8ba65288724451ca242d680";
-constexpr const char* kRealPhysical = "8a6a7191b34194bf07e46048bc72ff90";
+constexpr const char* kRealPhysical = "5d4803c85e13541b869f72a19c65049e";
 constexpr const char* kRealPaper = "9d091264755ea3c9784d9df979e66233";
 
 class SameBytes : public ::testing::Test {

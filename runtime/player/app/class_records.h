@@ -13,11 +13,11 @@
 #pragma once
 
 #include <cmath>
-#include <compare>
 #include <map>
 #include <set>
 #include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "formats/progress_book/progress_book.h"
@@ -44,7 +44,10 @@ ContrastingGroups contrasting_groups(std::span<const double> experts,
 struct ClassExercise {
     std::string case_name, name;
 
-    friend auto operator<=>(const ClassExercise&, const ClassExercise&) = default;
+    bool operator==(const ClassExercise&) const = default;
+    bool operator<(const ClassExercise& other) const {
+        return std::tie(case_name, name) < std::tie(other.case_name, other.name);
+    }
 };
 
 struct ExerciseReliability {

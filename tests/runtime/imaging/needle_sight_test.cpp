@@ -118,7 +118,7 @@ void compare_with_frames(const CaseBundle& bundle,
 TEST(NeedleSight, SaysWhatFramesShow) {
     Verdicts shafts, tips;
     compare_with_frames(phantom(), phantom_exercise(), shafts, tips);
-    EXPECT_LT(shafts.seen, 0.8 * shafts.points);  // ribs, gas, air and angles hide some of it
+    EXPECT_LT(shafts.seen, 0.85 * shafts.points);  // ribs, gas, air and angles hide some of it
     Exercise thin = phantom_exercise();
     thin.needle.gauge = 21;
     thin.needle.slab_mm = 0.9;
