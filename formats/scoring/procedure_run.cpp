@@ -22,7 +22,7 @@ constexpr double kPoolReachMm = 3;
 constexpr double kThrowStepMm = 0.5;
 constexpr double kWireMm = 450, kWireHeldMm = 50;
 constexpr double kShownWireMm = 60;  // drawn beyond the tip, at most
-constexpr double kBleedMlS = 0.2, kMostBledMl = 60, kStopBleedingS = 30;
+constexpr double kBleedMlS = 0.2, kMaxBledMl = 60, kStopBleedingS = 30;
 constexpr double kLongestStepS = 1;  // time of acts that last does not run on across a gap
 constexpr double kBeyondMm = 1;      // deeper than a collection's far side
 constexpr std::size_t kMaxPerformances = 128;
@@ -673,7 +673,7 @@ void ProcedureRun::update(double time_s,
     if (state_.bleeding_pool >= 0) {
         ProcedureState::Pool& pool = state_.pools[static_cast<std::size_t>(state_.bleeding_pool)];
         if (state_.bleeding_compressed_s < kStopBleedingS) {
-            const double ml = std::min(kBleedMlS * f.dt_s, kMostBledMl - pool.ml);
+            const double ml = std::min(kBleedMlS * f.dt_s, kMaxBledMl - pool.ml);
             pool.ml += ml;
             state_.bled_ml += ml;
         }

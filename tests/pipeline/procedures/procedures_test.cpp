@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/base/constants.h"
 #include "formats/base/random.h"
 #include "formats/exercise/exercise.h"
 #include "formats/recording/session.h"
@@ -278,7 +279,7 @@ TEST(Procedures, ARecordingGivesTheSameListAndTheSameMoments) {
 TEST(Procedures, WhatLeavesTheCollectionIsWhatItHeld) {
     const Exercise exercise = procedure_called("abscess-drainage");
     const ProcedureResult result = judge(play(expert_of(exercise)), exercise);
-    const double held_ml = 4.0 / 3 * 3.14159265358979 * 14 * 14 * 14 / 1000;
+    const double held_ml = 4.0 / 3 * kPi * 14 * 14 * 14 / 1000;
     EXPECT_NEAR(result.aspirated_ml + result.drained_ml, held_ml, 1e-9);
     EXPECT_EQ(result.injected_ml, 6);
 }
