@@ -207,14 +207,55 @@ std::string flowed(const std::string& lines) {
     return text;
 }
 
-// hints: how many the exercise has; negative: not checked here.
-std::vector<ExerciseTexts> read_texts(const TomlTable& table, int hints) {
+template <class List>
+const typename List::value_type* named(const List& list, const std::string& name) {
+    for (const auto& one : list)
+        if (one.name == name) return &one;
+    return nullptr;
+}
+
+// exercise: that the texts belong to; null: they are not compared with it here.
+void read_procedure_texts(const TomlTable& own, const Exercise* exercise, ExerciseTexts& texts) {
+    const auto unknown = [](const TomlTable& table, const std::string& name) {
+        table.add_fault("name", "'" + name + "' is not in the procedure",
+                        "expected the name of one of its [[steps]] or [[items]]");
+    };
+    for (const TomlTable& table : own.tables("steps")) {
+        ExerciseTexts::Step step;
+        table.text("name", step.name);
+        table.text("title", step.title);
+        table.text("instruction", step.instruction);
+        if (exercise && !named(exercise->procedure.steps, step.name)) unknown(table, step.name);
+        table.finish();
+        texts.steps.push_back(std::move(step));
+    }
+    for (const TomlTable& table : own.tables("items")) {
+        ExerciseTexts::Item item;
+        table.text("name", item.name);
+        table.text("title", item.title);
+        table.text("question", item.question);
+        table.texts("options", item.options, true);
+        if (exercise) {
+            const ProcedureItem* of = named(exercise->procedure.items, item.name);
+            if (!of) unknown(table, item.name);
+            if (of && !item.options.empty() && item.options.size() != of->options.size())
+                table.add_fault(
+                    "options", "has " + std::to_string(item.options.size()) + " texts",
+                    "expected " + std::to_string(of->options.size()) + ", one for each option");
+        }
+        table.finish();
+        texts.items.push_back(std::move(item));
+    }
+}
+
+// exercise: that the texts belong to; null: they are not compared with it here.
+std::vector<ExerciseTexts> read_texts(const TomlTable& table, const Exercise* exercise) {
     std::vector<ExerciseTexts> all;
     for (const std::string& language : table.keys()) {
         const auto own = table.table(language);
         if (language.size() != 2)
-            table.add_fault(language, "is no language",
-                            "expected a code of two letters, as in [texts.de]");
+            table.add_fault(language, "is not a language code",
+                            "expected two letters, as in [texts.de]");
         if (!own || language.size() != 2) continue;
         ExerciseTexts texts;
         texts.language = language;
@@ -222,10 +263,11 @@ std::vector<ExerciseTexts> read_texts(const TomlTable& table, int hints) {
         own->text("description", texts.description);
         texts.description = flowed(texts.description);
         own->texts("hints", texts.hints, true);
-        if (hints >= 0 && !texts.hints.empty() && static_cast<int>(texts.hints.size()) != hints)
-            own->add_fault(
-                "hints", "has " + std::to_string(texts.hints.size()) + " texts",
-                "expected " + std::to_string(hints) + ", one for each of the exercise's hints");
+        if (exercise && !texts.hints.empty() && texts.hints.size() != exercise->hints.size())
+            own->add_fault("hints", "has " + std::to_string(texts.hints.size()) + " texts",
+                           "expected " + std::to_string(exercise->hints.size()) +
+                               ", one for each of the exercise's hints");
+        read_procedure_texts(*own, exercise, texts);
         own->finish();
         all.push_back(std::move(texts));
     }
@@ -248,7 +290,6 @@ Exercise read_exercise(const TomlTable& root) {
     if (const auto mode = root.choice("mode", mode_names()))
         e.mode = static_cast<ExerciseMode>(*mode);
     root.texts("hints", e.hints, true);
-    if (auto table = root.table("texts")) read_texts(*table, static_cast<int>(e.hints.size()));
     root.whole("mastery", e.mastery, 1, 100);
     root.text("model", e.model, {"physical", "paper"});
     root.texts("effects", e.effects, true);
@@ -282,6 +323,7 @@ Exercise read_exercise(const TomlTable& root) {
     }
     for (const TomlTable& table : root.tables("pass_marks")) read_pass_mark(table, e.pass_marks);
     e.procedure = read_procedure(root, e);
+    if (auto table = root.table("texts")) read_texts(*table, &e);
     root.finish();
     return e;
 }
@@ -299,7 +341,7 @@ Result<std::vector<ExerciseTexts>> parse_exercise_texts(std::string_view toml,
                                                         const std::string& where) {
     SONOCASE_TRY(const auto root, TomlTable::parse(toml, where));
     std::vector<ExerciseTexts> texts;
-    if (auto table = root.table("texts")) texts = read_texts(*table, -1);
+    if (auto table = root.table("texts")) texts = read_texts(*table, nullptr);
     if (root.fault()) return *root.fault();
     return texts;
 }
@@ -307,14 +349,37 @@ Result<std::vector<ExerciseTexts>> parse_exercise_texts(std::string_view toml,
 ExerciseTexts texts_in(const Exercise& exercise,
                        const std::vector<ExerciseTexts>& texts,
                        std::string_view language) {
-    ExerciseTexts out{std::string(language),
-                      exercise.title.empty() ? exercise.name : exercise.title, exercise.description,
-                      exercise.hints};
+    ExerciseTexts out{.language = std::string(language),
+                      .title = exercise.title.empty() ? exercise.name : exercise.title,
+                      .description = exercise.description,
+                      .hints = exercise.hints,
+                      .steps = {},
+                      .items = {}};
+    for (const ProcedureStep& step : exercise.procedure.steps)
+        out.steps.push_back({step.name, step.title, step.instruction});
+    for (const ProcedureItem& item : exercise.procedure.items)
+        out.items.push_back({item.name, item.title, item.question, item.options});
+    const auto take = [](std::string& to, const std::string& own) {
+        if (!own.empty()) to = own;
+    };
     for (const ExerciseTexts& own : texts) {
         if (own.language != language) continue;
-        if (!own.title.empty()) out.title = own.title;
-        if (!own.description.empty()) out.description = own.description;
+        take(out.title, own.title);
+        take(out.description, own.description);
         if (own.hints.size() == exercise.hints.size()) out.hints = own.hints;
+        for (ExerciseTexts::Step& step : out.steps) {
+            const ExerciseTexts::Step* other = named(own.steps, step.name);
+            if (!other) continue;
+            take(step.title, other->title);
+            take(step.instruction, other->instruction);
+        }
+        for (ExerciseTexts::Item& item : out.items) {
+            const ExerciseTexts::Item* other = named(own.items, item.name);
+            if (!other) continue;
+            take(item.title, other->title);
+            take(item.question, other->question);
+            if (other->options.size() == item.options.size()) item.options = other->options;
+        }
     }
     return out;
 }

@@ -17,14 +17,24 @@ struct ExerciseTexts {
     std::string language;  // ISO 639-1
     std::string title, description;
     std::vector<std::string> hints;  // # hints of the exercise, or none
+    // Of its procedure, by name; in the order of the file, or of the procedure (texts_in()).
+    struct Step {
+        std::string name, title, instruction;
+    };
+    struct Item {
+        std::string name, title, question;
+        std::vector<std::string> options;  // as many as the item has, or none
+    };
+    std::vector<Step> steps;
+    std::vector<Item> items;
 };
 
 // In alphabetical order of their languages. Errors: those of parse_exercise().
 Result<std::vector<ExerciseTexts>> parse_exercise_texts(std::string_view toml,
                                                         const std::string& where);
 
-// Title, description and hints in a language, each as the exercise itself has it where `texts`
-// lack it. An exercise without a title is called by its name.
+// All texts in a language, each as the exercise itself has it where `texts` lack it; a step and an
+// item for each of the procedure, in its order. An exercise without a title is called by its name.
 ExerciseTexts texts_in(const Exercise& exercise,
                        const std::vector<ExerciseTexts>& texts,
                        std::string_view language);

@@ -13,8 +13,6 @@
 namespace sonocase {
 namespace {
 
-constexpr int kAny = -1;
-
 void read_flag(const TomlTable& table, std::string_view key, int& to) {
     bool on = false;
     if (table.flag(key, on)) to = on ? 1 : 0;
@@ -88,29 +86,25 @@ Condition read_condition(const TomlTable& table, const Procedure& procedure, boo
     return c;
 }
 
-bool says_nothing(const Condition& c) {
-    Condition empty;
-    return c.shows.empty() && c.tip_in.empty() && c.tip_not_in.empty() && c.needle_in == kAny &&
-           c.tip_in_view == kAny && c.probe_on_skin == kAny && c.wire_in == kAny &&
-           c.depth_at_least_mm < 0 && c.depth_at_most_mm < 0 && c.force_at_least_n < 0 &&
-           c.vein_open_at_most < 0 && c.drained_at_least < 0 && c.taken.empty() &&
-           c.aspirated.empty() && c.step.empty() && c.complication.empty() && c.act < 0;
+// The state that a condition asks for, without its act and its duration.
+Condition state_of(const Condition& c) {
+    Condition state = c;
+    const Condition none;
+    state.act = none.act;
+    state.at_least = none.at_least;
+    state.at_most = none.at_most;
+    state.hold_s = none.hold_s;
+    state.given = none.given;
+    return state;
 }
 
-// What `entry` asks for can never be undone by the time that `done` asks for the opposite only if
-// the two name the same state: then the step is over before it begins, or never.
+bool says_nothing(const Condition& c) {
+    return c.act < 0 && state_of(c) == Condition{};
+}
+
+// A step that is over in the state in which it begins would be over before it begins.
 bool done_before_entry(const Condition& entry, const Condition& done) {
-    return done.act < 0 && done.hold_s == 0 && entry.shows == done.shows &&
-           entry.tip_in == done.tip_in && entry.tip_not_in == done.tip_not_in &&
-           entry.needle_in == done.needle_in && entry.tip_in_view == done.tip_in_view &&
-           entry.probe_on_skin == done.probe_on_skin && entry.wire_in == done.wire_in &&
-           entry.depth_at_least_mm == done.depth_at_least_mm &&
-           entry.depth_at_most_mm == done.depth_at_most_mm &&
-           entry.force_at_least_n == done.force_at_least_n &&
-           entry.vein_open_at_most == done.vein_open_at_most &&
-           entry.drained_at_least == done.drained_at_least && entry.taken == done.taken &&
-           entry.aspirated == done.aspirated && entry.step == done.step &&
-           entry.complication == done.complication;
+    return done.act < 0 && done.hold_s == 0 && state_of(entry) == state_of(done);
 }
 
 template <class List>
@@ -270,6 +264,37 @@ std::string unknown_region(const Exercise& exercise, const std::vector<Label>& l
     return {};
 }
 
+std::vector<TrayAct> procedure_tray(const Procedure& procedure) {
+    std::array<bool, kActKinds> asked{};
+    const auto add = [&](const Condition& c) {
+        if (c.act >= 0) asked[static_cast<std::size_t>(c.act)] = true;
+        if (!c.aspirated.empty()) asked[static_cast<std::size_t>(ActKind::aspirate)] = true;
+        if (!c.taken.empty()) asked[static_cast<std::size_t>(ActKind::core_throw)] = true;
+        if (c.wire_in >= 0) asked[static_cast<std::size_t>(ActKind::wire)] = true;
+        if (c.drained_at_least >= 0) asked[static_cast<std::size_t>(ActKind::drain)] = true;
+    };
+    for (const ProcedureStep& step : procedure.steps)
+        for (const Condition* c : {&step.entry, &step.done}) add(*c);
+    for (const ProcedureItem& item : procedure.items) add(item.condition);
+    static const TrayAct kAll[] = {{{ActKind::inject, 0, 1}, "Inject 1 ml"},
+                                   {{ActKind::aspirate, 0, 1}, "Draw back 1 ml"},
+                                   {{ActKind::core_throw, 0, 15}, "Throw 15 mm"},
+                                   {{ActKind::core_throw, 0, 22}, "Throw 22 mm"},
+                                   {{ActKind::wire, 0, 20}, "Wire in 20 mm"},
+                                   {{ActKind::wire, 0, -20}, "Wire back 20 mm"},
+                                   {{ActKind::dilate, 0, 1}, "Dilator"},
+                                   {{ActKind::catheter, 0, 1}, "Catheter in"},
+                                   {{ActKind::catheter, 0, 0}, "Catheter out"},
+                                   {{ActKind::drain, 0, 5}, "Drain 5 ml"},
+                                   {{ActKind::compress, 0, 1}, "Press on it"},
+                                   {{ActKind::compress, 0, 0}, "Let go"},
+                                   {{ActKind::rescan, 0, 1}, "I looked again"}};
+    std::vector<TrayAct> tray;
+    for (const TrayAct& one : kAll)
+        if (asked[static_cast<std::size_t>(one.act.kind)]) tray.push_back(one);
+    return tray;
+}
+
 bool region_names_label(std::string_view region, std::string_view label) {
     if (!region.empty() && region.back() == '*')
         return label.substr(0, region.size() - 1) == region.substr(0, region.size() - 1);
@@ -282,6 +307,14 @@ const std::vector<std::string>& complication_names() {
         "bowel_punctured", "gallbladder_punctured", "bleeding",
         "wire_lost",       "artery_dilated",        "intravascular_injection"};
     return names;
+}
+
+std::span<const char* const> complication_titles() {
+    static constexpr const char* kTitles[] = {
+        "Pneumothorax",    "Artery punctured",       "Punctured through and through",
+        "Bowel punctured", "Gall bladder punctured", "Bleeding",
+        "Guide wire lost", "Artery dilated",         "Anaesthetic injected into a vessel"};
+    return kTitles;
 }
 
 const std::vector<std::string>& aspirate_names() {

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -42,6 +43,7 @@ struct Condition {
     double at_most = 1e9;            // likewise: more does not count
     double hold_s = 0;               // how long all of it must hold without a break
     bool given = false;              // the file has it
+    friend bool operator==(const Condition&, const Condition&) = default;
 };
 
 struct ProcedureStep {
@@ -116,8 +118,17 @@ std::string unknown_region(const Exercise& exercise, const std::vector<Label>& l
 // True if `region` names this label: itself, or by its beginning and *.
 bool region_names_label(std::string_view region, std::string_view label);
 
+// What lies ready for a trainee: each act that steps and items ask for, in the portions in which a
+// hand does it, and what undoes it. In the order of ActKind; without questions.
+struct TrayAct {
+    Act act;
+    const char* words;  // "Inject 1 ml"
+};
+std::vector<TrayAct> procedure_tray(const Procedure& procedure);
+
 // What can go wrong, in the order of ComplicationKind (formats/scoring/procedure_run.h).
 const std::vector<std::string>& complication_names();
+std::span<const char* const> complication_titles();  // as a clinician writes them
 // What a syringe can draw: "nothing", "blood", "urine", "bile", "fluid", "pus", "air".
 const std::vector<std::string>& aspirate_names();
 

@@ -759,6 +759,24 @@ bool ProcedureRun::item_ticked(int index) const {
     return false;
 }
 
+ProcedureView ProcedureRun::view() const {
+    ProcedureView view;
+    const Procedure& p = exercise_->procedure;
+    view.state = state_;
+    view.present_step = present_step();
+    for (std::size_t s = 0; s < p.steps.size(); ++s)
+        view.steps[s] = static_cast<int>(s) == view.present_step ? StepState::present
+                                                                 : step_state(static_cast<int>(s));
+    for (std::size_t i = 0; i < p.items.size() && view.question < 0; ++i) {
+        const ProcedureItem& item = p.items[i];
+        const bool asked =
+            item.from_step < 0 || state_.steps[static_cast<std::size_t>(item.from_step)].performed;
+        if (item.rule == ItemRule::asked && asked && !state_.items[i].held)
+            view.question = static_cast<int>(i);
+    }
+    return view;
+}
+
 double ProcedureRun::volume_ml(int target) const {
     return target >= 0 && target < static_cast<int>(left_ml_.size())
                ? left_ml_[static_cast<std::size_t>(target)]

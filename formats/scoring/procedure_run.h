@@ -111,6 +111,14 @@ struct ProcedureState {
     int bleeding_pool = -1;
 };
 
+// What a screen shows of it; a value, so that it can cross threads with its frame.
+struct ProcedureView {
+    int present_step = -1;  // ProcedureRun::present_step()
+    std::array<StepState, kMaxSteps> steps{};
+    int question = -1;  // the first item that is asked now and has no answer; -1: none
+    ProcedureState state;
+};
+
 struct ProcedureResult {
     struct Step {
         std::string name, title;
@@ -174,6 +182,7 @@ class ProcedureRun {
     int present_step() const;
     StepState step_state(int step) const;
     bool item_ticked(int item) const;
+    ProcedureView view() const;  // constant time for a given procedure; allocates nothing
     // Items and steps that changed in the last sample, as bits.
     std::uint32_t new_steps() const { return new_steps_; }
     std::uint32_t new_complications() const { return new_complications_; }

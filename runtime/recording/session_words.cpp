@@ -200,11 +200,9 @@ std::string event_words(const LiveEvent& event,
             return i < steps.size() ? "Done: " + steps[i].title : std::string();
         }
         case LiveEventKind::complication: {
-            const auto& names = complication_names();
+            const auto titles = complication_titles();
             const auto i = static_cast<std::size_t>(std::max(event.index, 0));
-            std::string name = i < names.size() ? names[i] : "a complication";
-            std::replace(name.begin(), name.end(), '_', ' ');
-            return "Complication: " + name;
+            return i < titles.size() ? titles[i] : "Complication";
         }
         default: return {};
     }

@@ -163,7 +163,10 @@ bool ReplayTracker::poll(double now_s, TrackerReading& reading) {
               : loop_ && duration > 0 ? lap_s + duration
                                       : -1;
     if (i == last_ && lap == laps_) return false;
-    const bool back = last_ != ~std::size_t{0} && (lap > laps_ || i < last_);
+    const bool began = last_ != ~std::size_t{0};
+    const bool back = began && (lap > laps_ || i < last_);
+    constexpr double kJumpS = 1;  // more than a busy machine lets pass between two polls
+    const bool forward = began && !back && probe[i].timestamp_s - probe[last_].timestamp_s > kJumpS;
     last_ = i;
     laps_ = lap;
     reading = {};
@@ -174,11 +177,11 @@ bool ReplayTracker::poll(double now_s, TrackerReading& reading) {
     reading.in_mannequin = recording_.in_mannequin;
     reading.sensor_count = recording_.needle.empty() ? 1 : 2;
     const double until_s = probe[i].timestamp_s + 5e-7;
-    if (back && !recording_.acts.empty()) {
-        reading.restarts = true;
+    if ((back || forward) && !recording_.acts.empty()) {
+        reading.restarts = back;
         // Those of the time that is skipped are not made up for; without their poses they would
         // do something else.
-        acted_ = 0;
+        if (back) acted_ = 0;
         while (acted_ < recording_.acts.size() &&
                recording_.acts[acted_].time_s < probe[i].timestamp_s - 5e-7)
             ++acted_;

@@ -78,7 +78,7 @@ const char* earlier_fault(const SessionScore& score) {
 AttemptResult attempt_result(const SessionScore& score, std::span<const ProgressEntry> earlier) {
     AttemptResult result;
     result.marks = static_cast<int>(score.pass_marks.size());
-    result.has_marks = result.marks > 0;
+    result.has_marks = result.marks > 0 || score.procedure;
     result.passed = score.passed;
     for (const PassResult& mark : score.pass_marks) {
         result.rows.push_back(row_of(mark));

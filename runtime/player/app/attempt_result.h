@@ -30,7 +30,8 @@ struct ResultRow {
 };
 
 struct AttemptResult {
-    bool has_marks = false;  // false: the exercise has none, and there is no verdict
+    // false: the exercise has neither marks nor a procedure, and there is no verdict
+    bool has_marks = false;
     bool passed = false;
     int marks = 0, marks_reached = 0;
     std::vector<ResultRow> rows;  // at most kMaxResults; marks first, missed ones before others

@@ -227,6 +227,7 @@ void ScanThread::describe(ScanFrame& out, double now_s) const {
     out.frozen = controls_.frozen;
     out.waiting = waiting_ && !controls_.frozen;
     out.reading = reading_;
+    if (engine_->procedure().given()) out.procedure = engine_->procedure().view();
     out.layout = engine_->renderer().layout();
     out.depth_mm = engine_->exercise().probe.depth_mm;
     out.focus_mm = engine_->exercise().probe.focus_mm;

@@ -50,6 +50,7 @@ struct ScanFrame {
     int width_px = 0, height_px = 0;
     FrameStatus status = FrameStatus::no_contact;
     FrameRecord record;
+    ProcedureView procedure;  // of the exercise's procedure; where it has none, empty
     DopplerFrame doppler;
     TrackerReading reading;
     Renderer::Layout layout;

@@ -84,7 +84,7 @@ float draw_verdict(Ui& ui, const Box& box, const AttemptResult& result, int hint
     ui.text(head.take_top(38), tr(verdict), Type::title);
     std::string all;
     char words[96] = "";
-    if (result.has_marks) {
+    if (result.marks > 0) {
         std::snprintf(words, sizeof words, tr("%d of %d marks reached."), result.marks_reached,
                       result.marks);
         all = words;
@@ -97,9 +97,129 @@ float draw_verdict(Ui& ui, const Box& box, const AttemptResult& result, int hint
     return 68;
 }
 
+const char* missed_words(const std::string& why) {
+    return why == "too_early"      ? "Too early"
+           : why == "too_late"     ? "Too late"
+           : why == "happened"     ? "It happened"
+           : why == "wrong_answer" ? "Answered wrongly"
+           : why == "not_answered" ? "Not answered"
+                                   : "Not done";
+}
+
+// Of an item or a step in the language in use; the name, if the exercise does not have it any more.
+template <class Texts>
+std::string title_in(const Texts& texts, const std::string& name) {
+    for (const auto& one : texts)
+        if (one.name == name) return one.title;
+    return name;
+}
+
+// Of a part of a core: a target or finding by its name, a label in words.
+std::string taken_words(const CaseState& loaded, const std::string& region) {
+    const Exercise& e = loaded.exercise();
+    const auto named = [&](const auto& lesion) { return lesion.name == region; };
+    return std::any_of(e.targets.begin(), e.targets.end(), named) ||
+                   std::any_of(e.findings.begin(), e.findings.end(),
+                               [&](const Finding& f) { return named(f.lesion); })
+               ? region
+               : tissue_words(region);
+}
+
+// The list of a procedure: what was done and what was not, each with its moment in the recording,
+// to which its button leads.
+void draw_checklist(Ui& ui,
+                    Box& room,
+                    const Box& seen,
+                    const SessionView& session,
+                    const ProcedureResult& list,
+                    Requests& requests) {
+    const ExerciseTexts texts = session.loaded.texts();
+    const auto ticked = std::count_if(list.items.begin(), list.items.end(),
+                                      [](const auto& item) { return item.ticked; });
+    char words[160];
+    std::snprintf(words, sizeof words, tr("Checklist: %d of %d, %.0f points of %.0f, %.0f needed"),
+                  static_cast<int>(ticked), static_cast<int>(list.items.size()), list.points,
+                  list.max_points, list.cut);
+    ui.paragraph(room.take_top(ui.paragraph_height(room.w, words, Type::bold) + 6), words,
+                 Type::bold);
+    const bool replays = !session.scan.training.score_file.empty();
+    int number = 0;
+    // A moment of the recording; where the list is scrolled out of its card, no button.
+    const auto moment = [&](Box& line, double time_s) {
+        ++number;
+        if (time_s < 0) return;
+        const std::string when = clock_words(time_s);
+        const Box box = line.take_right(72, 8);
+        ButtonStyle style;
+        style.link = true;
+        style.tip = "Shows this moment in the replay";
+        const std::string id = "moment" + std::to_string(number);
+        if (!replays || box.y < seen.y - 1 || box.bottom() > seen.bottom() + 1) {
+            ui.text(box, when, Type::small, colour::kDim, Align::centre);
+        } else if (ui.button(id.c_str(), box, when, style)) {
+            constexpr double kBeforeS = 2;
+            requests.push_back(request::StartReplay{std::max(time_s - kBeforeS, 0.0)});
+        }
+    };
+    for (const ProcedureResult::Item& item : list.items) {
+        ui.line(room.x, room.y, room.right(), room.y, colour::kLine);
+        Box line = room.take_top(44);
+        ui.icon(item.ticked ? Icon::check : Icon::fail, line.x + 8, line.y + 11, 20,
+                item.ticked ? colour::kGood : colour::kBad);
+        line.take_left(44);
+        moment(line, item.time_s);
+        std::string under = item.ticked ? "" : tr(missed_words(item.why));
+        if (item.critical) under += (under.empty() ? "" : " · ") + std::string(tr("critical"));
+        const std::string title = title_in(texts.items, item.name);
+        ui.text(under.empty() ? line : line.take_top(24), title, Type::body, colour::kText,
+                Align::left, true);
+        if (!under.empty())
+            ui.text(line, under, Type::small, item.ticked ? colour::kDim : colour::kBad,
+                    Align::left, true);
+    }
+    for (const ProcedureResult::Happened& one : list.complications) {
+        ui.line(room.x, room.y, room.right(), room.y, colour::kLine);
+        Box line = room.take_top(36);
+        ui.icon(Icon::warn, line.x + 8, line.y + 8, 20, colour::kBad);
+        line.take_left(44);
+        moment(line, one.time_s);
+        const auto& names = complication_names();
+        const auto at = static_cast<std::size_t>(std::find(names.begin(), names.end(), one.name) -
+                                                 names.begin());
+        if (at < names.size())
+            ui.text(line, tr(complication_titles()[at]), Type::body, colour::kText, Align::left,
+                    true);
+    }
+    if (list.stray_acts > list.stray_acts_at_most) {
+        std::snprintf(words, sizeof words,
+                      tr("%d acts where no step asks for them; at most %d pass."), list.stray_acts,
+                      list.stray_acts_at_most);
+        room.take_top(ui.paragraph(room, words, Type::small, colour::kBad, true), 4);
+    }
+    if (!list.taken.empty()) {
+        std::string core = std::string(tr("Last core")) + ":";
+        for (const ProcedureResult::Taken& taken : list.taken)
+            if (taken.mm >= 1)
+                core +=
+                    " " + taken_words(session.loaded, taken.region) + text(" %.0f mm,", taken.mm);
+        core.pop_back();
+        room.take_top(ui.paragraph(room, core, Type::small, colour::kDim, true), 8);
+    }
+}
+
 std::string advice_words(const SessionView& session) {
     const AttemptResult& result = *session.scan.training.result;
     const CaseState& loaded = session.loaded;
+    if (const auto& list = session.scan.training.score->procedure; list && !list->passed) {
+        // The first critical item that was missed, else the first of all.
+        const ProcedureResult::Item* missed = nullptr;
+        for (const ProcedureResult::Item& item : list->items)
+            if (!item.ticked && (!missed || (item.critical && !missed->critical))) missed = &item;
+        if (missed)
+            return std::string(tr("Missing")) + ": " +
+                   title_in(loaded.texts().items, missed->name) + ". " +
+                   tr(missed_words(missed->why)) + ".";
+    }
     if (*result.advice) return tr(result.advice);
     const int mastery = std::max(loaded.exercise().mastery, 1);
     const Standing now =
@@ -196,8 +316,12 @@ float draw_all_measures(Ui& ui, Box room, const SessionScore& score) {
 }
 
 // advice: within the list, where there is no card for it beside.
-void draw_results(
-    Ui& ui, const Box& card, const SessionView& session, AfterPage& page, bool advice) {
+void draw_results(Ui& ui,
+                  const Box& card,
+                  const SessionView& session,
+                  AfterPage& page,
+                  bool advice,
+                  Requests& requests) {
     const Training& training = session.scan.training;
     const AttemptResult& result = *training.result;
     ui.card(card, "results");
@@ -214,6 +338,8 @@ void draw_results(
         const Box place{room.x + 44, room.y, room.w - 56, 100};
         room.take_top(ui.paragraph(place, words, Type::body, colour::kText, true), 12);
     }
+    if (training.score->procedure)
+        draw_checklist(ui, room, inside, session, *training.score->procedure, requests);
     for (const ResultRow& row : result.rows) {
         ui.line(room.x, room.y, room.right(), room.y, colour::kLine);
         draw_result(ui, room.take_top(76), row);
@@ -328,7 +454,7 @@ void draw_after_page(
         if (!training.result->trend_metric.empty() && side.h > 120)
             draw_trend(ui, side.take_top(std::min(260.0f, side.h)), *training.result);
     }
-    draw_results(ui, content, session, screen.after, page.columns < 2);
+    draw_results(ui, content, session, screen.after, page.columns < 2, requests);
 }
 
 }  // namespace sonocase::runtime::inline player_ui

@@ -11,6 +11,7 @@
 #include "runtime/player/app/case_steps.h"
 #include "runtime/player/app/tracker_steps.h"
 #include "runtime/player/ui/pages.h"
+#include "runtime/player/ui/panels.h"
 
 namespace sonocase::runtime::inline player_ui {
 
@@ -31,6 +32,7 @@ std::span<const Shortcut> shortcuts() {
         {"A  D  Z  X  Shift + drag", "aim in the plane and out of it"},
         {"Shift + A  D", "roll it: its tip shows best with the bevel towards the probe"},
         {"Shift + I J K L", "move its entry while it is outside"},
+        {"J K L I  with Ctrl too", "what lies on the tray of a procedure, as its buttons say"},
         {nullptr, "Picture"},
         {"Space", "freeze"},
         {",  .  P", "cine back, forward, play"},
@@ -293,6 +295,20 @@ void step_view(ViewFrom& from) {
                                      : ViewFrom::outside;
 }
 
+// The tray of a procedure: J, K, L, I, and the same with Ctrl.
+void perform_by_key(const SessionView& session, Requests& requests) {
+    const Procedure& procedure = session.loaded.exercise().procedure;
+    if (!procedure.given() || !session.scan.training.attempt || ImGui::GetIO().KeyShift) return;
+    constexpr int kKeys[] = {GLFW_KEY_J, GLFW_KEY_K, GLFW_KEY_L, GLFW_KEY_I};
+    for (int k = 0; k < 4; ++k) {
+        if (!pressed(kKeys[k])) continue;
+        const auto tray = tray_now(procedure, session.loaded.frame().procedure.state);
+        const int i = ImGui::GetIO().KeyCtrl ? 4 + k : k;
+        if (i < static_cast<int>(tray.size()))
+            requests.push_back(request::PerformAct{tray[static_cast<std::size_t>(i)].act});
+    }
+}
+
 void handle_scan_keys(const SessionView& session,
                       Settings& settings,
                       Console& console,
@@ -313,6 +329,7 @@ void handle_scan_keys(const SessionView& session,
     } else if (pressed(GLFW_KEY_R) && scan.training.score && !scan.training.attempt) {
         requests.push_back(request::OpenReview{});
     }
+    perform_by_key(session, requests);
     view.hover.outlines = down(GLFW_KEY_U);
     if (pressed(GLFW_KEY_M)) view.tools.measuring = !view.tools.measuring;
     if (pressed(GLFW_KEY_C)) clear_marks(view.tools);

@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "runtime/player/app/case_steps.h"
 #include "runtime/player/app/states.h"
@@ -54,12 +55,21 @@ struct TaskCardInput {
     bool has_result;    // of an attempt before
     int difficulty;     // of the attempt beside the exercise as written (draw_attempt.h)
     bool shows_finish;  // the card has the button that starts and ends an attempt
+    const ProcedureView* procedure;    // of the frame shown; null: the exercise has none
+    int put_off;                       // question that the trainee put off; -1: none
+    const std::vector<Label>& labels;  // of the case
 };
 struct TaskCardRequest {
     bool toggle_attempt = false, show_result = false, toggle_needle = false, next_hint = false,
-         skip_guide = false, end_replay = false;
+         skip_guide = false, end_replay = false, put_off_question = false;
+    std::optional<Act> act;
 };
 TaskCardRequest draw_task_card(Ui& ui, const Box& card, const TaskCardInput& input);
+// What lies on the tray of a procedure now, in the order of its keys.
+std::vector<TrayAct> tray_now(const Procedure& procedure, const ProcedureState& state);
+inline constexpr int kTrayKeys = 8;
+// "J", "Ctrl + J": of the i-th act on the tray, i < kTrayKeys.
+const char* tray_key(int i);
 // The button alone, where the layout keeps it outside the card. True: pressed.
 bool draw_attempt_button(Ui& ui, const Box& box, const TaskCardInput& input);
 

@@ -161,8 +161,14 @@ void PlayerWindow::carry_out(const request::SkipGuide&) {
     if (scan_.training.guide) scan_.training.guide->skip();
 }
 
-void PlayerWindow::carry_out(const request::StartReplay&) {
-    if (start_replay(player_, loaded_, scan_)) view_.screen.page = Page::scan;
+void PlayerWindow::carry_out(const request::StartReplay& wanted) {
+    if (!start_replay(player_, loaded_, scan_)) return;
+    view_.screen.page = Page::scan;
+    if (wanted.from_s > 0) scan_.tracker.paced->jump(wanted.from_s);
+}
+
+void PlayerWindow::carry_out(const request::PerformAct& wanted) {
+    loaded_.scan->with_engine([&](ScanEngine& engine) { (void)engine.act(wanted.act); });
 }
 
 void PlayerWindow::carry_out(const request::EndReplay&) {

@@ -49,7 +49,8 @@ class PlayerWindow {
     void carry_out(const request::ToggleAttempt&);
     void carry_out(const request::NextHint&);
     void carry_out(const request::SkipGuide&);
-    void carry_out(const request::StartReplay&);
+    void carry_out(const request::StartReplay& wanted);
+    void carry_out(const request::PerformAct& wanted);
     void carry_out(const request::EndReplay&);
     void carry_out(const request::OpenReview&);
     void carry_out(const request::StartExamSet&);

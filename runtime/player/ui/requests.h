@@ -36,7 +36,12 @@ struct ChooseExercise {
 struct ToggleAttempt {};
 struct NextHint {};
 struct SkipGuide {};
-struct StartReplay {};
+struct StartReplay {
+    double from_s = 0;  // of the recording
+};
+struct PerformAct {
+    Act act;
+};
 struct EndReplay {};
 struct OpenReview {};
 struct StartExamSet {};
@@ -100,6 +105,7 @@ using Request = std::variant<request::OpenCase,
                              request::NextHint,
                              request::SkipGuide,
                              request::StartReplay,
+                             request::PerformAct,
                              request::EndReplay,
                              request::OpenReview,
                              request::StartExamSet,

@@ -204,25 +204,29 @@ void show_task(const SessionView& session,
     const Training& training = scan.training;
     const std::vector<Point3> centres = loaded.target_centres();
     const ExerciseTexts texts = loaded.texts();
-    const TaskCardInput input{.exercise = loaded.exercise(),
-                              .texts = texts,
-                              .record = loaded.frame().record,
-                              .target_centres = centres,
-                              .targets_reached = training.targets_reached,
-                              .steps = training.steps_done,
-                              .attempt = training.attempt.get(),
-                              .attempt_number = attempt_number(session),
-                              .mouse = scan.tracker.mouse.get(),
-                              .guide = training.guide ? &*training.guide : nullptr,
-                              .exam = training.in_exam(),
-                              .replays = scan.replay.runs(),
-                              .flipped = scan.console.controls.settings.flip_left_right,
-                              .live = session.live,
-                              .shows_targets = shows_targets(scan, loaded.exercise()),
-                              .hints_shown = training.hints_shown,
-                              .has_result = training.result.has_value(),
-                              .difficulty = attempt_difficulty(loaded.attempt_seed),
-                              .shows_finish = finish.empty()};
+    const TaskCardInput input{
+        .exercise = loaded.exercise(),
+        .texts = texts,
+        .record = loaded.frame().record,
+        .target_centres = centres,
+        .targets_reached = training.targets_reached,
+        .steps = training.steps_done,
+        .attempt = training.attempt.get(),
+        .attempt_number = attempt_number(session),
+        .mouse = scan.tracker.mouse.get(),
+        .guide = training.guide ? &*training.guide : nullptr,
+        .exam = training.in_exam(),
+        .replays = scan.replay.runs(),
+        .flipped = scan.console.controls.settings.flip_left_right,
+        .live = session.live,
+        .shows_targets = shows_targets(scan, loaded.exercise()),
+        .hints_shown = training.hints_shown,
+        .has_result = training.result.has_value(),
+        .difficulty = attempt_difficulty(loaded.attempt_seed),
+        .shows_finish = finish.empty(),
+        .procedure = loaded.exercise().procedure.given() ? &loaded.frame().procedure : nullptr,
+        .put_off = screen.put_off,
+        .labels = loaded.open->bundle->labels};
     TaskCardRequest wanted;
     if (shows_card) wanted = draw_task_card(ui, card, input);
     if (!finish.empty() && draw_attempt_button(ui, finish, input))
@@ -233,6 +237,8 @@ void show_task(const SessionView& session,
     if (wanted.skip_guide) requests.push_back(request::SkipGuide{});
     if (wanted.end_replay) requests.push_back(request::EndReplay{});
     if (wanted.toggle_needle) requests.push_back(request::ToggleNeedle{});
+    if (wanted.put_off_question) screen.put_off = input.procedure->question;
+    if (wanted.act) requests.push_back(request::PerformAct{*wanted.act});
 }
 
 const char* mode_words(DopplerMode mode) {

@@ -78,6 +78,46 @@ float hint_height(const Ui& ui, float width, const std::string& words) {
     return 44 + (words.empty() ? 0 : ui.paragraph_height(width - 20, words, Type::small) + 10);
 }
 
+const ProcedureView* shown_procedure(const TaskCardInput& input) {
+    return input.attempt && !input.replays ? input.procedure : nullptr;
+}
+
+// Of a part of a core: a target, a finding, or a label of the case.
+std::string taken_words(const TaskCardInput& input, const ProcedureState::Taken& taken) {
+    const Exercise& e = input.exercise;
+    if (taken.label >= 0)
+        return tissue_words(input.labels[static_cast<std::size_t>(taken.label)].name);
+    const auto target = static_cast<std::size_t>(-1 - taken.label);
+    return target < e.targets.size() ? e.targets[target].name
+                                     : e.findings[target - e.targets.size()].lesion.name;
+}
+
+// What the hands have done so far, in one line; empty: nothing.
+std::string done_words(const TaskCardInput& input, const ProcedureState& state) {
+    std::string line;
+    const auto add = [&](const std::string& words) { line += (line.empty() ? "" : " · ") + words; };
+    const double injected = state.injected_ml + state.injected_lost_ml;
+    if (injected > 0) add(text(tr("%.0f ml injected"), injected));
+    if (state.aspirated >= 0)
+        add(std::string(tr("drawn")) + ": " +
+            tr(aspirate_names()[static_cast<std::size_t>(state.aspirated)].c_str()));
+    if (state.throws > 0) {
+        std::string core;
+        for (int i = 0; i < state.taken_count; ++i) {
+            const ProcedureState::Taken& taken = state.taken[static_cast<std::size_t>(i)];
+            if (taken.mm < 1) continue;
+            core +=
+                (core.empty() ? "" : ", ") + taken_words(input, taken) + text(" %.0f mm", taken.mm);
+        }
+        add(std::string(tr("core")) + ": " + (core.empty() ? tr("nothing") : core));
+    }
+    if (state.wire_in) add(text(tr("wire %.0f mm in"), state.wire_mm));
+    if (state.catheter_in) add(tr("catheter lies"));
+    if (state.drained_ml > 0) add(text(tr("%.0f ml drained"), state.drained_ml));
+    if (state.compressed_s > 0) add(text(tr("%.0f s pressed"), state.compressed_s));
+    return line;
+}
+
 // What the values and the hints of the card take below what stands above them.
 float kept_free(const Ui& ui, float width, const TaskCardInput& input) {
     if (!input.attempt) return 3 * kRow;
@@ -159,6 +199,136 @@ void draw_values(Ui& ui, Box& room, const TaskCardInput& input) {
     if (!view.problem.empty())
         room.take_top(
             ui.paragraph(room, tr_message(view.problem), Type::small, colour::kBad, true));
+}
+
+void draw_step_tab(Ui& ui, const Box& tab, int number, StepState state) {
+    const bool now = state == StepState::present;
+    ui.fill(tab, now ? colour::kChosen : colour::kControl, 4);
+    if (now) ui.fill({tab.x, tab.bottom() - 3, tab.w, 3}, colour::kAccent, 1.5f);
+    const bool waits = now || state == StepState::waiting;
+    if (waits) {
+        ui.text(tab, std::to_string(number), now ? Type::bold : Type::body,
+                now ? colour::kText : colour::kDim, Align::centre);
+    } else {
+        const bool done = state == StepState::done;
+        ui.icon(done ? Icon::check : Icon::warn, tab.x + 0.5f * tab.w - 9, tab.y + 5, 18,
+                done ? colour::kGood : colour::kWarn);
+    }
+}
+
+// The steps of a procedure: which are done, and what is to be done now. An exam does not say.
+void draw_procedure_steps(Ui& ui, Box& room, const TaskCardInput& input) {
+    const ProcedureView& view = *input.procedure;
+    const int count = static_cast<int>(input.texts.steps.size());
+    if (count == 0) return;
+    constexpr int kMostTabs = 10;
+    if (count <= kMostTabs) {
+        const Box tabs = room.take_top(28, 6);
+        for (int i = 0; i < count; ++i)
+            draw_step_tab(ui, tabs.column(i, count, 4), i + 1,
+                          view.steps[static_cast<std::size_t>(i)]);
+    } else {
+        char line[48];
+        std::snprintf(line, sizeof line, tr("Step %d of %d"),
+                      view.present_step < 0 ? count : view.present_step + 1, count);
+        ui.text(room.take_top(20, 4), line, Type::small, colour::kDim);
+    }
+    const bool over = view.present_step < 0;
+    const ExerciseTexts::Step* step =
+        over ? nullptr : &input.texts.steps[static_cast<std::size_t>(view.present_step)];
+    const std::string title =
+        over ? tr("All steps are behind you: finish the attempt") : step->title;
+    const float high = std::min(ui.paragraph_height(room.w, title, Type::bold), 40.0f);
+    ui.paragraph(room.take_top(high, 4), title, Type::bold, colour::kText, true);
+    if (!over) draw_small(ui, room, step->instruction, 0);
+}
+
+// What lies ready, two to a row from the bottom up; the needle of the mouse first.
+void draw_tray(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
+    const std::vector<TrayAct> tray = tray_now(input.exercise.procedure, input.procedure->state);
+    const int needle = input.mouse ? 1 : 0;
+    const int cells = static_cast<int>(tray.size()) + needle;
+    if (cells == 0) return;
+    constexpr float kHigh = 38, kBetween = 6;
+    const int rows = (cells + 1) / 2;
+    const float whole = static_cast<float>(rows) * (kHigh + kBetween) - kBetween;
+    Box place = room.take_bottom(whole, 8);
+    for (int cell = 0; cell < cells; ++cell) {
+        const float down = static_cast<float>(cell / 2) * (kHigh + kBetween);
+        if (down + kHigh > place.h + 1) break;
+        const Box box = Box{place.x, place.y + down, place.w, kHigh}.column(cell % 2, 2, kBetween);
+        ButtonStyle style;
+        if (cell < needle) {
+            style.key = "N";
+            style.tip = "Shift + N puts it across the plane";
+            request.toggle_needle =
+                ui.button("needle", box,
+                          tr(input.mouse->has_needle() ? "Withdraw needle" : "Take needle"), style);
+            continue;
+        }
+        const int i = cell - needle;
+        const TrayAct& act = tray[static_cast<std::size_t>(i)];
+        style.enabled = input.live;
+        style.may_cut = true;
+        if (i < kTrayKeys) style.tip = tray_key(i);
+        const std::string id = "act" + std::to_string(i);
+        if (ui.button(id.c_str(), box, tr(act.words), style)) request.act = act.act;
+    }
+}
+
+// A question of the procedure. False: none is asked now, or it waits.
+bool draw_question(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
+    const int question = input.procedure->question;
+    if (question < 0 || question == input.put_off) return false;
+    const ExerciseTexts::Item& item = input.texts.items[static_cast<std::size_t>(question)];
+    Box card = room.take_top(room.h);
+    ui.card(card, "question", colour::kRaised);
+    card = card.inset(10, 8);
+    const float high =
+        std::min(ui.paragraph_height(card.w, item.question, Type::bold), 0.5f * card.h);
+    ui.paragraph(card.take_top(high, 8), item.question, Type::bold, colour::kText, true);
+    for (std::size_t o = 0; o < item.options.size(); ++o) {
+        const std::string& option = item.options[o];
+        const float words = ui.paragraph_height(card.w - 24, option, Type::body);
+        const Box box = card.take_top(std::max(words + 16, 38.0f), 6);
+        if (box.h < 30) break;
+        const std::string id = "option" + std::to_string(o);
+        ButtonStyle style;
+        style.left = true;
+        style.may_cut = true;
+        style.enabled = input.live;
+        if (ui.button(id.c_str(), box, option, style))
+            request.act =
+                Act{.kind = ActKind::answer, .index = question, .amount = static_cast<double>(o)};
+    }
+    ButtonStyle later;
+    later.link = true;
+    later.tip = "It is asked again when the next question is answered";
+    if (card.h >= 30)
+        request.put_off_question = ui.button(
+            "later", card.take_bottom(30).take_left(ui.width(tr("Later"), Type::body) + 16),
+            tr("Later"), later);
+    return true;
+}
+
+// The card while a procedure runs.
+void draw_procedure(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
+    const ProcedureView& view = *input.procedure;
+    if (!input.exam) draw_procedure_steps(ui, room, input);
+    if (draw_question(ui, room, input, request)) return;
+    draw_tray(ui, room, input, request);
+    const std::string done = done_words(input, view.state);
+    if (!done.empty()) draw_small(ui, room, done, 0);
+    if (!input.exam) {
+        for (std::size_t k = 0; k < view.state.complication_s.size(); ++k) {
+            if (view.state.complication_s[k] < 0 || room.h < 24) continue;
+            const Box line = room.take_top(22, 2);
+            ui.icon(Icon::warn, line.x, line.y + 2, 18, colour::kBad);
+            ui.text({line.x + 24, line.y, line.w - 24, line.h}, tr(complication_titles()[k]),
+                    Type::small, colour::kBad, Align::left, true);
+        }
+    }
+    draw_values(ui, room, input);
 }
 
 // Hints asked for so far, the last one in full; where that does not fit, one line and a button.
@@ -250,6 +420,22 @@ void draw_head(Ui& ui, Box& room, const TaskCardInput& input) {
 
 }  // namespace
 
+std::vector<TrayAct> tray_now(const Procedure& procedure, const ProcedureState& state) {
+    std::vector<TrayAct> tray = procedure_tray(procedure);
+    std::erase_if(tray, [&](const TrayAct& one) {
+        const bool on = one.act.amount > 0;
+        if (one.act.kind == ActKind::compress) return on == state.compressing;
+        return one.act.kind == ActKind::catheter && on == state.catheter_in;
+    });
+    return tray;
+}
+
+const char* tray_key(int i) {
+    constexpr const char* kKeys[kTrayKeys] = {"J",        "K",        "L",        "I",
+                                              "Ctrl + J", "Ctrl + K", "Ctrl + L", "Ctrl + I"};
+    return kKeys[i];
+}
+
 bool draw_attempt_button(Ui& ui, const Box& box, const TaskCardInput& input) {
     ButtonStyle style;
     style.primary = true;
@@ -277,7 +463,8 @@ TaskCardRequest draw_task_card(Ui& ui, const Box& card, const TaskCardInput& inp
         (input.replays ? request.end_replay : request.toggle_attempt) = pressed;
     }
     draw_head(ui, room, input);
-    if (!input.replays && room.h > 150 && (input.mouse || !input.attempt)) {
+    if (!input.replays && !shown_procedure(input) && room.h > 150 &&
+        (input.mouse || !input.attempt)) {
         Box links = room.take_bottom(44, 8);
         ButtonStyle style;
         if (input.has_result && !input.attempt) {
@@ -305,6 +492,10 @@ TaskCardRequest draw_task_card(Ui& ui, const Box& card, const TaskCardInput& inp
                      tr("What was done, beside the straight way (dotted). The bar below the "
                         "picture goes to any moment, at any speed."),
                      Type::small, colour::kDim, true);
+        return request;
+    }
+    if (shown_procedure(input)) {
+        draw_procedure(ui, room, input, request);
         return request;
     }
     if (input.attempt && !input.exam && room.h > 150) draw_steps(ui, room, input);

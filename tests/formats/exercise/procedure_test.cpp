@@ -8,6 +8,7 @@
 #include <string>
 
 #include "formats/exercise/exercise.h"
+#include "formats/exercise/exercise_texts.h"
 #include "formats/volume/label_volume.h"
 
 namespace sonocase {
@@ -72,6 +73,51 @@ TEST(ReadProcedure, FindsARegionThatTheCaseLacks) {
     EXPECT_EQ(unknown_region(*exercise, {outside, lung}), "liver");
     EXPECT_TRUE(region_names_label("lung*", lung.name));
     EXPECT_FALSE(region_names_label("lung", lung.name));
+}
+
+TEST(ProcedureTray, HoldsWhatIsAskedForAndWhatUndoesIt) {
+    const auto exercise = parse_exercise(
+        std::string(kHead) + kLook +
+            "[[steps]]\nname = \"a\"\ndone = { act = \"inject\", at_least = 5 }\n"
+            "[[steps]]\nname = \"b\"\nentry = { wire_in = true }\ndone = { act = \"compress\" }\n"
+            "[[items]]\nname = \"i\"\nwhen = { aspirated = \"blood\" }\n",
+        "x.toml");
+    ASSERT_TRUE(exercise) << exercise.error().message();
+    std::string tray;
+    for (const TrayAct& one : procedure_tray(exercise->procedure)) {
+        ActList list;
+        list.add(one.act);
+        tray += acts_text(list) + ";";
+    }
+    EXPECT_EQ(tray, "inject=1;aspirate=1;wire=20;wire=-20;compress=1;compress=0;");
+    EXPECT_TRUE(procedure_tray(Procedure{}).empty());
+}
+
+TEST(ProcedureTexts, AreReadInAnotherLanguageByName) {
+    const std::string text =
+        std::string(kHead) + "title = \"X\"\n" + kLook +
+        "[[items]]\nname = \"q\"\nquestion = \"Free fluid?\"\noptions = [\"Yes\", \"No\"]\n"
+        "answer = 1\n"
+        "[[texts.de.steps]]\nname = \"look\"\ntitle = \"Schauen\"\n"
+        "[[texts.de.items]]\nname = \"q\"\nquestion = \"Freie Flüssigkeit?\"\n"
+        "options = [\"Ja\", \"Nein\"]\n";
+    const auto exercise = parse_exercise(text, "x.toml");
+    ASSERT_TRUE(exercise) << exercise.error().message();
+    const auto texts = parse_exercise_texts(text, "x.toml");
+    ASSERT_TRUE(texts) << texts.error().message();
+    const ExerciseTexts german = texts_in(*exercise, *texts, "de");
+    ASSERT_EQ(german.steps.size(), 1u);
+    ASSERT_EQ(german.items.size(), 1u);
+    EXPECT_EQ(german.steps[0].title, "Schauen");
+    EXPECT_EQ(german.steps[0].instruction, exercise->procedure.steps[0].instruction);
+    EXPECT_EQ(german.items[0].question, "Freie Flüssigkeit?");
+    EXPECT_EQ(german.items[0].options, (std::vector<std::string>{"Ja", "Nein"}));
+    EXPECT_EQ(texts_in(*exercise, *texts, "en").items[0].options,
+              exercise->procedure.items[0].options);
+    expect_fault(kLook + std::string("[[texts.de.steps]]\nname = \"lok\"\n"), 6,
+                 "is not in the procedure");
+    const std::string three = text + "[[texts.fr.items]]\nname = \"q\"\noptions = [\"Oui\"]\n";
+    EXPECT_FALSE(parse_exercise(three, "x.toml"));
 }
 
 TEST(Acts, ComeBackFromTheirText) {

@@ -43,10 +43,63 @@ std::vector<SeenBox> load_boxes(const std::string& file) {
     return boxes;
 }
 
-const char* const kPages[] = {"scan",     "attempt", "frozen", "after",     "replay",   "help",
-                              "tracker",  "effects", "cases",  "exercises", "setup",    "colour",
-                              "spectrum", "motion",  "named",  "marks",     "settings", "notices",
-                              "class",    "sign_in", "longest"};
+const char* const kPages[] = {
+    "scan",     "attempt",   "frozen", "after",   "replay",   "help",     "tracker", "effects",
+    "cases",    "exercises", "setup",  "colour",  "spectrum", "motion",   "named",   "marks",
+    "settings", "notices",   "class",  "sign_in", "longest",  "question", "tray",    "checklist"};
+
+// A procedure with as many acts as the tray has keys, long words, and a question.
+const char* const kProcedure = R"(name = "procedure"
+title = "A procedure with a long title that takes two lines of the card"
+[probe]
+shape = "linear"
+depth_mm = 60
+[needle]
+length_mm = 100
+[[targets]]
+name = "lesion"
+centre = [0, 0, 0]
+radius_mm = 5
+[procedure]
+cut = 1
+[[steps]]
+name = "numb"
+title = "Numb the way down to the capsule, with all that is needed"
+instruction = "Inject at least 5 ml on the way, no deeper than 35 mm, and wait until it works."
+done = { act = "inject", at_least = 5 }
+[[steps]]
+name = "draw"
+done = { act = "aspirate", at_least = 1 }
+[[steps]]
+name = "throw"
+done = { act = "core_throw", at_least = 15 }
+[[steps]]
+name = "wire"
+done = { act = "wire", at_least = 100 }
+[[steps]]
+name = "catheter"
+done = { act = "catheter" }
+[[steps]]
+name = "again"
+done = { act = "rescan" }
+[[items]]
+name = "numbed"
+title = "The way numbed down to the capsule, before anything else was done"
+critical = true
+step = "numb"
+[[items]]
+name = "asked"
+title = "Clotting checked"
+question = "INR is 2.1 and nothing else is known about the patient. What do you do now?"
+options = ["Go on", "Wait until clotting is corrected or the way is another", "Take a thinner needle"]
+answer = 1
+[texts.de]
+title = "Ein Ablauf mit einem langen Namen, der zwei Zeilen der Karte braucht"
+[[texts.de.steps]]
+name = "numb"
+title = "Betäuben Sie den Weg bis zur Kapsel, mit allem, was dazu gehört"
+instruction = "Mindestens 5 ml auf dem Weg, nicht tiefer als 35 mm, und warten Sie, bis es wirkt."
+)";
 
 // The spectral mode with its gain at -30 dB, a number of two digits and a sign.
 std::string longest_values() {
@@ -66,10 +119,12 @@ std::string script(const std::string& folder) {
            "key escape\nkey f12\nwait 2\nkey f3\nwait 2\n" + shot("setup") + "key f3\nhold u 6\n" +
            shot("named") + "key 2 shift\nwait 6\n" + shot("colour") + "key 3 shift\nwait 6\n" +
            shot("spectrum") + "key 4 shift\nwait 6\n" + shot("motion") + longest_values() +
-           "wait 2\n" + shot("longest") + "key 1 shift\nkey f2\nwait 30\n" + shot("cases") +
-           "press settings\nwait 2\n" + shot("settings") + "press Notices\nwait 2\n" +
-           shot("notices") + "key escape\npress settings\nwait 2\npress Sign in\nwait 2\n" +
-           shot("sign_in") +
+           "wait 2\n" + shot("longest") + "key 1 shift\nkey f5\nwait 4\nkey b\nwait 4\n" +
+           shot("question") + "press later\nkey j\nkey k\nkey l\nkey i\nkey i ctrl\nwait 4\n" +
+           shot("tray") + "key b\nwait 8\n" + shot("checklist") + "key escape\nkey f2\nwait 30\n" +
+           shot("cases") + "press settings\nwait 2\n" + shot("settings") +
+           "press Notices\nwait 2\n" + shot("notices") +
+           "key escape\npress settings\nwait 2\npress Sign in\nwait 2\n" + shot("sign_in") +
            "key escape\npress settings\nwait 2\npress Class\nwait 4\npress Ann Onymous\nwait 2\n" +
            shot("class") + "quit\n";
 }
@@ -150,6 +205,7 @@ void tour(const std::string& size, double scale, const std::string& language) {
     std::filesystem::create_directories(place);
     CaseBundle bundle = sonocase::testing::flowing_case();
     bundle.exercises[0].toml += kMarks;
+    bundle.exercises.push_back({"procedure", kProcedure});
     ASSERT_TRUE(save_bundle(bundle, place + "/cylinder.sonocase"));
     folder.write("home/sonocase/player.json", R"({"sound": false})");
     fill_book(place + "/sonocase/progress.sqlite");
@@ -182,6 +238,12 @@ void tour(const std::string& size, double scale, const std::string& language) {
         }
         if (page == std::string("settings")) {
             EXPECT_TRUE(has("Help") && has("Instructor"));
+        }
+        if (page == std::string("question")) {
+            EXPECT_TRUE(has("option0") && has("later"));
+        }
+        if (page == std::string("tray") && width_px / used >= 900) {
+            EXPECT_TRUE(has("act0") && !has("option0"));
         }
         if (page == std::string("notices")) {
             EXPECT_TRUE(has("close") && !has("Help"));
