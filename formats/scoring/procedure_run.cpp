@@ -849,6 +849,16 @@ ProcedureResult ProcedureRun::result() const {
             out.complications.push_back({complication_names()[k], state_.complication_s[k]});
     std::stable_sort(out.complications.begin(), out.complications.end(),
                      [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
+    out.taken = taken();
+    out.injected_ml = state_.injected_ml;
+    out.aspirated_ml = state_.aspirated_ml;
+    out.drained_ml = state_.drained_ml;
+    out.bled_ml = state_.bled_ml;
+    return out;
+}
+
+std::vector<ProcedureResult::Taken> ProcedureRun::taken() const {
+    std::vector<ProcedureResult::Taken> out;
     for (int i = 0; i < state_.taken_count; ++i) {
         const ProcedureState::Taken& taken = state_.taken[static_cast<std::size_t>(i)];
         const std::string name = taken.label < 0
@@ -856,13 +866,19 @@ ProcedureResult ProcedureRun::result() const {
                                  : taken.label < static_cast<int>(names_.size())
                                      ? names_[static_cast<std::size_t>(taken.label)]
                                      : std::string();
-        out.taken.push_back({name, taken.mm});
+        out.push_back({name, taken.mm});
     }
-    out.injected_ml = state_.injected_ml;
-    out.aspirated_ml = state_.aspirated_ml;
-    out.drained_ml = state_.drained_ml;
-    out.bled_ml = state_.bled_ml;
     return out;
+}
+
+std::vector<TrayAct> tray_now(const Procedure& procedure, const ProcedureState& state) {
+    std::vector<TrayAct> tray = procedure_tray(procedure);
+    std::erase_if(tray, [&](const TrayAct& one) {
+        const bool on = one.act.amount > 0;
+        if (one.act.kind == ActKind::compress) return on == state.compressing;
+        return one.act.kind == ActKind::catheter && on == state.catheter_in;
+    });
+    return tray;
 }
 
 std::optional<ProcedureResult> procedure_result(const Session& session,

@@ -119,6 +119,9 @@ struct ProcedureView {
     ProcedureState state;
 };
 
+// procedure_tray() without what is done already: no second hand presses, no drain lies twice.
+std::vector<TrayAct> tray_now(const Procedure& procedure, const ProcedureState& state);
+
 struct ProcedureResult {
     struct Step {
         std::string name, title;
@@ -191,6 +194,7 @@ class ProcedureRun {
     double volume_ml(int target) const;  // what a collection still holds
     // `ended`: what waits still is missed.
     ProcedureResult result() const;
+    std::vector<ProcedureResult::Taken> taken() const;  // by the last throw
 
   private:
     struct Regions {  // names of a condition, resolved

@@ -68,4 +68,62 @@ std::string metric_words_json() {
     return detail::json_text(out, false);
 }
 
+std::string procedure_json(const PagePlayer& player) {
+    const Exercise& exercise = player.exercise();
+    const ProcedureRun& run = player.engine().procedure();
+    Json out = Json::object();
+    if (!run.given()) return detail::json_text(out, false);
+    const Procedure& p = exercise.procedure;
+    const ProcedureView view = run.view();
+    Json steps = Json::array(), tray = Json::array(), complications = Json::array(),
+         taken = Json::array();
+    for (std::size_t s = 0; s < p.steps.size(); ++s) {
+        Json step = Json::object();
+        step["title"] = p.steps[s].title;
+        step["instruction"] = p.steps[s].instruction;
+        step["state"] = step_state_name(view.steps[s]);
+        steps.push_back(std::move(step));
+    }
+    for (const TrayAct& one : tray_now(p, view.state)) {
+        Json act = Json::object();
+        act["kind"] = static_cast<int>(one.act.kind);
+        act["index"] = one.act.index;
+        act["amount"] = one.act.amount;
+        act["words"] = one.words;
+        tray.push_back(std::move(act));
+    }
+    for (std::size_t k = 0; k < view.state.complication_s.size(); ++k)
+        if (view.state.complication_s[k] >= 0) complications.push_back(complication_titles()[k]);
+    for (const ProcedureResult::Taken& one : run.taken()) {
+        Json part = Json::object();
+        part["region"] = one.region;
+        part["mm"] = one.mm;
+        taken.push_back(std::move(part));
+    }
+    out["question"] = nullptr;
+    if (view.question >= 0) {
+        const ProcedureItem& item = p.items[static_cast<std::size_t>(view.question)];
+        Json question = Json::object();
+        question["item"] = view.question;
+        question["words"] = item.question;
+        question["options"] = item.options;
+        out["question"] = std::move(question);
+    }
+    const ProcedureState& s = view.state;
+    out["steps"] = std::move(steps);
+    out["present"] = view.present_step;
+    out["tray"] = std::move(tray);
+    out["complications"] = std::move(complications);
+    out["taken"] = std::move(taken);
+    out["throws"] = s.throws;
+    out["injected_ml"] = s.injected_ml + s.injected_lost_ml;
+    out["aspirated"] =
+        s.aspirated < 0 ? std::string() : aspirate_names()[static_cast<std::size_t>(s.aspirated)];
+    out["drained_ml"] = s.drained_ml;
+    out["wire_mm"] = s.wire_in ? s.wire_mm : 0.0;
+    out["catheter_in"] = s.catheter_in;
+    out["compressed_s"] = s.compressed_s;
+    return detail::json_text(out, false);
+}
+
 }  // namespace sonocase::runtime::inline web

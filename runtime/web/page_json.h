@@ -18,4 +18,9 @@ std::string case_json(const PagePlayer& player);
 // [{"name", "group", "title", "unit"}] of every score, in the order of metric_table().
 std::string metric_words_json();
 
+// Where the procedure of an attempt stands: {"steps": [{title, instruction, state}], "present": n,
+// "question": {item, words, options} or null, "tray": [{kind, index, amount, words}],
+// "complications": [words], and what the hands have done}. "{}" without a procedure.
+std::string procedure_json(const PagePlayer& player);
+
 }  // namespace sonocase::runtime::inline web

@@ -183,6 +183,9 @@ class PagePlayer {
     PageDoppler& doppler() { return doppler_; }
     const PageDoppler& doppler() const { return doppler_; }
 
+    // An act of the exercise's procedure, for the next frame. False: too many wait already.
+    bool act(const Act& act) { return engine_->act(act); }
+
     // started: ISO 8601, UTC. seed: that targets and start are drawn with (draw_attempt.h); 0: as
     // written. Else the probe goes to the start without a needle, and the case has to be whole: a
     // draw reads all of it. Errors: it is not whole; the image cannot be made.

@@ -65,10 +65,8 @@ struct TaskCardRequest {
     std::optional<Act> act;
 };
 TaskCardRequest draw_task_card(Ui& ui, const Box& card, const TaskCardInput& input);
-// What lies on the tray of a procedure now, in the order of its keys.
-std::vector<TrayAct> tray_now(const Procedure& procedure, const ProcedureState& state);
 inline constexpr int kTrayKeys = 8;
-// "J", "Ctrl + J": of the i-th act on the tray, i < kTrayKeys.
+// "J", "Ctrl + J": of the i-th act on the tray (tray_now()), i < kTrayKeys.
 const char* tray_key(int i);
 // The button alone, where the layout keeps it outside the card. True: pressed.
 bool draw_attempt_button(Ui& ui, const Box& box, const TaskCardInput& input);

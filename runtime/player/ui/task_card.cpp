@@ -420,16 +420,6 @@ void draw_head(Ui& ui, Box& room, const TaskCardInput& input) {
 
 }  // namespace
 
-std::vector<TrayAct> tray_now(const Procedure& procedure, const ProcedureState& state) {
-    std::vector<TrayAct> tray = procedure_tray(procedure);
-    std::erase_if(tray, [&](const TrayAct& one) {
-        const bool on = one.act.amount > 0;
-        if (one.act.kind == ActKind::compress) return on == state.compressing;
-        return one.act.kind == ActKind::catheter && on == state.catheter_in;
-    });
-    return tray;
-}
-
 const char* tray_key(int i) {
     constexpr const char* kKeys[kTrayKeys] = {"J",        "K",        "L",        "I",
                                               "Ctrl + J", "Ctrl + K", "Ctrl + L", "Ctrl + I"};

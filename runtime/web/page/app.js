@@ -4,16 +4,12 @@
 import {Core, PlainError, has_simd} from './core.js';
 import {download, file_name, keep_attempt, kept_attempts, launch_of, minutes, remove_attempts, send_statements, set_trainee, statement, trainee} from './results.js';
 import {PoseSource} from './poses.js';
-import {ScanPage} from './scan.js';
+import {ScanPage, element} from './scan.js';
 import {ArrivingCase} from './arriving.js';
 import {inside_page, load_list, open_bytes} from './source.js';
 
 const $ = (id) => document.getElementById(id);
 const kPages = ['start', 'scan', 'after', 'scores'];
-
-function element(name, text = '', properties = {}) {
-    return Object.assign(document.createElement(name), {textContent: text}, properties);
-}
 
 class App {
     constructor() {
@@ -298,7 +294,7 @@ class App {
         const table = new Map(this.core.metric_words().map((one) => [one.name, one]));
         const with_unit = (name, value) => value === null ? '–' : `${Number(value.toFixed(2))} ${table.get(name)?.unit ?? ''}`.trim();
         const title = (name) => table.get(name)?.title ?? name;
-        $('verdict').textContent = !score.pass_marks.length ? 'Scored' : score.passed ? 'Passed' : 'Not passed yet';
+        $('verdict').textContent = !score.pass_marks.length && !score.procedure ? 'Scored' : score.passed ? 'Passed' : 'Not passed yet';
         const failed = score.pass_marks.filter((mark) => !mark.passed).map((mark) => title(mark.metric));
         $('why').textContent = failed.length ? `Not reached: ${failed.join(', ')}.` : '';
         $('marks').replaceChildren(...score.pass_marks.map((mark) => {
@@ -307,10 +303,22 @@ class App {
             return row([title(mark.metric), with_unit(mark.metric, mark.value), needed,
                 mark.passed ? '✓ reached' : '✗ not reached'], mark.passed ? 'pass' : 'fail');
         }));
+        this.show_checklist(score.procedure);
         $('measures').replaceChildren(...Object.entries(score.metrics).map(([name, value]) => row([title(name), with_unit(name, value)])));
         $('after-notice').textContent = '';
         this.show('after');
         $('verdict').focus();
+    }
+    // The list of a procedure, each item with its moment in the recording.
+    show_checklist(list) {
+        $('checklist-box').hidden = !list;
+        if (!list) return;
+        const ticked = list.items.filter((item) => item.ticked).length;
+        $('checklist-words').textContent = [`${ticked} of ${list.items.length} items, ${list.points} of ${list.max_points} points, ${list.cut} needed`,
+            list.stray_acts > list.stray_acts_at_most ? `${list.stray_acts} acts where no step asks for them; at most ${list.stray_acts_at_most} pass` : '',
+            ...list.complications.map((one) => `${one.name.replaceAll('_', ' ')} at ${minutes(one.time_s)}`)].filter((words) => words).join(' · ');
+        $('checklist').replaceChildren(...list.items.map((item) => row([item.title, item.time_s === null ? '–' : minutes(item.time_s),
+            item.critical ? 'critical' : '', item.ticked ? '✓ done' : `✗ ${item.why.replaceAll('_', ' ')}`], item.ticked ? 'pass' : 'fail')));
     }
     save(attempt, what) {
         const name = file_name(attempt);

@@ -210,6 +210,13 @@ export class Core {
         this.calls.attempt_words();
         return this.text().split('\n').filter((line) => line);
     }
+    // Where the procedure of the attempt stands (page_json.h); null: the exercise has none.
+    procedure() {
+        this.calls.procedure();
+        const state = JSON.parse(this.text());
+        return state.steps ? state : null;
+    }
+    act({kind, index, amount}) { return this.calls.act(kind, index, amount) === 1; }
     // {recording: bytes of an .igs.mha, score_text: JSON text, score}
     finish_attempt() {
         this.check(this.calls.finish_attempt());

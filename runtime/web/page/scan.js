@@ -10,7 +10,25 @@ import {View3d} from './view3d.js';
 const kIdleRate = 40;  // pictures per second while nothing moves: tissue breathes, noise changes
 const kSliders = 8;
 const $ = (id) => document.getElementById(id);
+const kAnswer = 9;  // of the kinds of acts
 const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
+
+export function element(name, text = '', properties = {}) {
+    return Object.assign(document.createElement(name), {textContent: text}, properties);
+}
+
+// What the hands have done in a procedure, in one line.
+function hands_words(state) {
+    const named = ({region, mm}) => `${region.replaceAll('_', ' ')} ${mm.toFixed(0)} mm`;
+    return [state.injected_ml > 0 ? `${state.injected_ml.toFixed(0)} ml injected` : '',
+        state.aspirated ? `drawn: ${state.aspirated}` : '',
+        state.throws ? `core: ${state.taken.filter(({mm}) => mm >= 1).map(named).join(', ') || 'nothing'}` : '',
+        state.wire_mm > 0 ? `wire ${state.wire_mm.toFixed(0)} mm in` : '',
+        state.catheter_in ? 'catheter lies' : '',
+        state.drained_ml > 0 ? `${state.drained_ml.toFixed(0)} ml drained` : '',
+        state.compressed_s > 0 ? `${state.compressed_s.toFixed(0)} s pressed` : '',
+        ...state.complications].filter((words) => words).join(' · ');
+}
 
 export class ScanPage {
     // page: app.js, for what leads away from scanning
@@ -194,6 +212,7 @@ export class ScanPage {
         $('needle-depth').disabled = !v.has_needle;
         if (document.activeElement !== $('needle-depth')) $('needle-depth').value = v.needle_depth_mm;
         if (attempt && this.frames % 10 === 0) this.say_events();
+        if (attempt !== !$('procedure').hidden || this.frames % 10 === 0) this.say_procedure(attempt);
         const age = this.frozen ? this.core.calls.kept_age_s(this.back) : 0;
         put('cine-words', this.frozen ? `FROZEN ${age.toFixed(1)} s ago` : 'Live, last 20 s');
         $('cine').disabled = !this.frozen;
@@ -206,6 +225,46 @@ export class ScanPage {
         this.events_said = words.join();
         $('events').replaceChildren(...words.map((line) => Object.assign(document.createElement('li'), {textContent: line})));
     }
+    // Steps, question and tray of a procedure; rebuilt only when something of them has changed, so that a control in
+    // focus stays.
+    say_procedure(attempt) {
+        const state = attempt ? this.core.procedure() : null;
+        $('procedure').hidden = !state;
+        if (!state) {
+            this.procedure_said = '';
+            return;
+        }
+        $('hands-words').textContent = hands_words(state);
+        const {steps, present, question, tray} = state;
+        const said = JSON.stringify([steps, present, question, tray, this.exam()]);
+        if (said === this.procedure_said) return;
+        this.procedure_said = said;
+        const kMark = {done: '✓', too_early: '!', too_late: '!', missed: '!'};
+        $('steps').hidden = this.exam();
+        $('step-words').hidden = this.exam();
+        $('steps').replaceChildren(...steps.map((step) => {
+            const line = element('li', `${kMark[step.state] ?? ''} ${step.title}`.trim(), {className: step.state});
+            if (step.state === 'present') line.setAttribute('aria-current', 'step');
+            return line;
+        }));
+        $('step-words').textContent = steps[present]?.instruction ?? (steps.length ? 'All steps are behind you: finish the attempt.' : '');
+        $('question').hidden = !question;
+        $('question-words').textContent = question?.words ?? '';
+        const button = (words, act) => {
+            const one = element('button', words, {type: 'button'});
+            one.addEventListener('click', () => this.perform(act));
+            return one;
+        };
+        $('options').replaceChildren(...(question?.options ?? []).map((words, n) => button(words, {kind: kAnswer, index: question.item, amount: n})));
+        $('tray').replaceChildren(...tray.map((act) => button(act.words, act)));
+        this.tray = tray;
+    }
+    perform(act) {
+        if (!this.core.act(act)) this.notice('Too many acts at once: wait a moment.');
+        this.touched();
+    }
+    // By its place on the tray.
+    perform_nth(n) { if (this.values.attempt && this.tray?.[n]) this.perform(this.tray[n]); }
     say_console() {
         $('depth').value = this.values.depth_mm / 10;
         $('focus').value = this.values.focus_mm / 10;

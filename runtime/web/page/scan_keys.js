@@ -30,6 +30,7 @@ export function press_key(scan, code, {shift}, repeated) {
         KeyF: () => scan.flip(),
         KeyB: () => scan.toggle_attempt(),
         KeyH: () => scan.next_hint(),
+        ...shift ? {} : {KeyJ: () => scan.perform_nth(0), KeyK: () => scan.perform_nth(1), KeyL: () => scan.perform_nth(2), KeyI: () => scan.perform_nth(3)},
         Home: () => { scan.core.calls.probe_home(); scan.touched(); },
         Digit0: () => scan.level(),
         F1: () => scan.page.help(),

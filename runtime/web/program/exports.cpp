@@ -382,6 +382,15 @@ SONOCASE_EXPORT(attempt_words) void attempt_words() {
     if (!page.player->attempt()) return;
     for (const std::string& words : page.player->attempt()->words()) page.text += words + "\n";
 }
+// text(): where the procedure of the attempt stands (page_json.h).
+SONOCASE_EXPORT(procedure) void procedure() {
+    page.text = procedure_json(*page.player);
+}
+// An act of the procedure, by the number of its kind (formats/recording/acts.h). 0: too many wait.
+SONOCASE_EXPORT(act) int act(int kind, int index, double amount) {
+    if (kind < 0 || kind >= kActKinds) return 0;
+    return page.player->act({static_cast<ActKind>(kind), index, amount}) ? 1 : 0;
+}
 // bytes(): the recording; text(): its scores (score_json).
 SONOCASE_EXPORT(finish_attempt) int finish_attempt() {
     Result<FinishedSession> finished = page.player->finish_attempt();

@@ -86,6 +86,59 @@ TEST(PagePlayer, an_attempt_is_scored_as_its_recording_is) {
     EXPECT_EQ(score_json(replayed, player->exercises()[0]), finished->score_json);
 }
 
+// Acts, steps and the list are those of the core: what the page says while it runs is what its
+// recording is scored as.
+TEST(PagePlayer, a_procedure_is_done_asked_and_ticked) {
+    CaseBundle bundle = testing::small_case();
+    bundle.exercises[0].toml += R"(
+[procedure]
+cut = 2
+[[steps]]
+name = "numb"
+title = "Numb the way"
+done = { act = "inject", at_least = 2, tip_in = "body" }
+[[items]]
+name = "numbed"
+step = "numb"
+[[items]]
+name = "asked"
+question = "Ready?"
+options = ["No", "Yes"]
+answer = 1
+)";
+    auto opened = PagePlayer::open(bytes_of(bundle), "small");
+    ASSERT_TRUE(opened) << opened.error().message();
+    PagePlayer& player = **opened;
+    ASSERT_TRUE(player.choose_exercise(0, 128));
+    ASSERT_TRUE(player.start_attempt("", "2026-01-31T12:00:00Z", 0));
+    ASSERT_TRUE(player.hands().take_needle(player.exercise().probe, true));
+    ASSERT_TRUE(player.hands().aim_needle_at({0, 0, 25}));
+    const auto says = [&](const char* words) {
+        const std::string json = procedure_json(player);
+        return json.find(words) != std::string::npos;
+    };
+    for (int n = 0; n < 150; ++n) {
+        player.hands().advance_needle(0.4);
+        player.frame(0.05 * n, {});
+    }
+    EXPECT_TRUE(says("Ready?"));
+    EXPECT_TRUE(says("Inject 1 ml"));
+    EXPECT_TRUE(player.act({ActKind::answer, 1, 1}));
+    player.frame(8, {});
+    EXPECT_FALSE(says("Ready?"));
+    EXPECT_TRUE(says("\"state\":\"present\""));
+    for (int n = 0; n < 2; ++n) EXPECT_TRUE(player.act({ActKind::inject, 0, 1}));
+    player.frame(8.1, {});
+    EXPECT_TRUE(says("\"state\":\"done\""));
+    EXPECT_TRUE(says("\"injected_ml\":2"));
+    const auto finished = player.finish_attempt();
+    ASSERT_TRUE(finished) << finished.error().message();
+    ASSERT_TRUE(finished->score.procedure);
+    EXPECT_TRUE(finished->score.procedure->passed);
+    EXPECT_EQ(finished->score.procedure->points, 2);
+    EXPECT_EQ(procedure_json(*open_small()), "{}");
+}
+
 // An attempt's targets lie where the seed in its recording says, as the desktop finds them.
 TEST(PagePlayer, an_attempt_is_drawn_from_its_seed_and_scored_there) {
     CaseBundle bundle = testing::small_case();
