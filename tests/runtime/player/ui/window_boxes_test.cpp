@@ -265,19 +265,21 @@ void tour(const std::string& size, double scale, const std::string& language) {
     EXPECT_FALSE(picture.empty());
 }
 
+// The layout is a function of the window's size divided by the scale (layout.h): these are the sizes
+// that differ, 3840 x 2160 down to the least of 640 x 360, and one that comes out of rounding.
 TEST(WindowBoxes, NothingOverlapsOrIsCutAt1280) {
-    for (const double scale : {1.0, 1.5, 2.0, 3.0}) tour("1280x720", scale, "C");
+    for (const double scale : {1.0, 1.5, 2.0}) tour("1280x720", scale, "C");
 }
 
 // With sanitizers one size: the code is the same at all of them, and a software OpenGL driver takes
 // minutes to draw the large ones.
 #ifndef __SANITIZE_ADDRESS__
 TEST(WindowBoxes, NothingOverlapsOrIsCutAt1920) {
-    for (const double scale : {1.0, 1.5, 2.0, 3.0}) tour("1920x1080", scale, "C");
+    for (const double scale : {1.0, 1.5}) tour("1920x1080", scale, "C");
 }
 
 TEST(WindowBoxes, NothingOverlapsOrIsCutAt4K) {
-    for (const double scale : {1.0, 1.5, 2.0, 3.0}) tour("3840x2160", scale, "C");
+    for (const double scale : {1.0, 1.5}) tour("3840x2160", scale, "C");
 }
 #endif
 
