@@ -339,6 +339,45 @@ std::string pass_marks(const ReviewInput& input) {
     return filled("pass_marks", {{"rows", rows}});
 }
 
+std::string seconds_words(double time_s) {
+    return time_s < 0 ? "\u2013" : number_text(time_s, 3) + " s";
+}
+
+// The list of a procedure, and below it what went wrong.
+std::string checklist(const ReviewInput& input) {
+    if (!input.score.procedure) return "";
+    const ProcedureResult& list = *input.score.procedure;
+    std::string rows;
+    for (const ProcedureResult::Item& item : list.items) {
+        std::string why = item.why;
+        std::replace(why.begin(), why.end(), '_', ' ');
+        rows += filled("checklist_item",
+                       {{"title", escaped_html(item.title) + (item.critical ? " (critical)" : "")},
+                        {"when", seconds_words(item.time_s)},
+                        {"class", item.ticked ? "good" : "bad"},
+                        {"verdict", item.ticked ? "done" : why},
+                        {"source", escaped_html(item.source)}});
+    }
+    const auto& names = complication_names();
+    for (const ProcedureResult::Happened& one : list.complications) {
+        const auto at = std::find(names.begin(), names.end(), one.name) - names.begin();
+        rows += filled("checklist_item",
+                       {{"title", complication_titles()[static_cast<std::size_t>(at)]},
+                        {"when", seconds_words(one.time_s)},
+                        {"class", "bad"},
+                        {"verdict", "complication"},
+                        {"source", ""}});
+    }
+    std::string points = number_text(list.points, 4) + " points of " +
+                         number_text(list.max_points, 4) + ", " + number_text(list.cut, 4) +
+                         " needed.";
+    if (list.stray_acts > list.stray_acts_at_most)
+        points += " " + std::to_string(list.stray_acts) +
+                  " acts where no step asks for them; at most " +
+                  std::to_string(list.stray_acts_at_most) + " pass.";
+    return filled("checklist", {{"points", points}, {"rows", rows}});
+}
+
 // The score of the last session, marked as better or worse, and the course over all sessions.
 std::string comparison(const ReviewInput& input, const MetricInfo& info, double value) {
     double before = NAN;
@@ -441,7 +480,7 @@ std::string review_page(const ReviewInput& input, const std::vector<SessionView>
     const SessionHeader& header = input.session.header;
     const std::string dot = " \u00b7 ";
     std::string verdict, warnings, figures;
-    if (!input.score.pass_marks.empty())
+    if (!input.score.pass_marks.empty() || input.score.procedure)
         verdict = filled(input.score.passed ? "verdict_passed" : "verdict_not_passed", {});
     for (const auto* list : {&input.warnings, &input.score.warnings}) {
         for (const std::string& warning : *list)
@@ -456,6 +495,7 @@ std::string review_page(const ReviewInput& input, const std::vector<SessionView>
                  {"verdict", verdict},
                  {"warnings", warnings},
                  {"cards", cards(input)},
+                 {"checklist", checklist(input)},
                  {"pass_marks", pass_marks(input)},
                  {"time_line", timeline_svg(input)},
                  {"insertions", insertions(input)},
