@@ -53,7 +53,6 @@ double tip_to_target(const CaseState& loaded, const FrameRecord& record) {
 void draw_head(const SessionView& session, Ui& ui, Box& room) {
     const CaseState& loaded = session.loaded;
     const Training& training = session.scan.training;
-    const Exercise& exercise = loaded.exercise();
     const std::string title = loaded.texts().title;
     const float line = ui.line_height(Type::heading);
     const float high = std::min(ui.paragraph_height(room.w, title, Type::heading), 2 * line + 1);

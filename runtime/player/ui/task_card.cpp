@@ -220,7 +220,7 @@ void draw_step_tab(Ui& ui, const Box& tab, int number, StepState state) {
 void draw_procedure_steps(Ui& ui, Box& room, const TaskCardInput& input) {
     const ProcedureView& view = *input.procedure;
     const int count = static_cast<int>(input.texts.steps.size());
-    if (count == 0) return;
+    if (count == 0 || room.h < 30) return;
     constexpr int kMostTabs = 10;
     if (count <= kMostTabs) {
         const Box tabs = room.take_top(28, 6);
@@ -239,6 +239,7 @@ void draw_procedure_steps(Ui& ui, Box& room, const TaskCardInput& input) {
     const std::string title =
         over ? tr("All steps are behind you: finish the attempt") : step->title;
     const float high = std::min(ui.paragraph_height(room.w, title, Type::bold), 40.0f);
+    if (room.h < high) return;
     ui.paragraph(room.take_top(high, 4), title, Type::bold, colour::kText, true);
     if (!over) draw_small(ui, room, step->instruction, 0);
 }
@@ -249,14 +250,15 @@ void draw_tray(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& r
     const int needle = input.mouse ? 1 : 0;
     const int cells = static_cast<int>(tray.size()) + needle;
     if (cells == 0) return;
-    constexpr float kHigh = 38, kBetween = 6;
     const int rows = (cells + 1) / 2;
-    const float whole = static_cast<float>(rows) * (kHigh + kBetween) - kBetween;
+    const bool low = static_cast<float>(rows) * 44 + 110 > room.h;
+    const float high = low ? 30 : 38, between = low ? 4 : 6;
+    const float whole = static_cast<float>(rows) * (high + between) - between;
     Box place = room.take_bottom(whole, 8);
     for (int cell = 0; cell < cells; ++cell) {
-        const float down = static_cast<float>(cell / 2) * (kHigh + kBetween);
-        if (down + kHigh > place.h + 1) break;
-        const Box box = Box{place.x, place.y + down, place.w, kHigh}.column(cell % 2, 2, kBetween);
+        const float down = static_cast<float>(cell / 2) * (high + between);
+        if (down + high > place.h + 1) break;
+        const Box box = Box{place.x, place.y + down, place.w, high}.column(cell % 2, 2, between);
         ButtonStyle style;
         if (cell < needle) {
             style.key = "N";
@@ -276,47 +278,66 @@ void draw_tray(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& r
     }
 }
 
-// A question of the procedure. False: none is asked now, or it waits.
-bool draw_question(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
+// Words on a control that take several lines.
+bool wrapped_button(
+    Ui& ui, const char* id, const Box& box, const std::string& words, Type type, bool enabled) {
+    ButtonStyle style;
+    style.enabled = enabled;
+    const bool pressed = ui.button(id, box, "", style);
+    const float high = std::min(ui.paragraph_height(box.w - 20, words, type), box.h - 4);
+    ui.begin_in_control();
+    ui.paragraph({box.x + 10, box.y + 0.5f * (box.h - high), box.w - 20, high}, words, type,
+                 colour::kText, true);
+    ui.end_in_control();
+    return pressed;
+}
+
+bool question_waits(const TaskCardInput& input) {
+    return input.procedure->question >= 0 && input.procedure->question != input.put_off;
+}
+
+// A question of the procedure, in all of the room; in small words where they do not fit.
+void draw_question(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
     const int question = input.procedure->question;
-    if (question < 0 || question == input.put_off) return false;
     const ExerciseTexts::Item& item = input.texts.items[static_cast<std::size_t>(question)];
-    Box card = room.take_top(room.h);
+    constexpr float kLater = 28, kBetween = 4;
+    const float width = room.w - 20;
+    const auto option_high = [&](const std::string& option, Type type) {
+        return ui.paragraph_height(width - 20, option, type) + (type == Type::body ? 20 : 10);
+    };
+    const auto whole = [&](Type type) {
+        float high = ui.paragraph_height(width, item.question, type) + 24 + kLater;
+        for (const std::string& option : item.options) high += option_high(option, type) + kBetween;
+        return high;
+    };
+    const Type type = whole(Type::body) <= room.h ? Type::body : Type::small;
+    if (whole(type) > room.h) return;  // a notice is in its place
+    Box card = room.take_top(whole(type));
     ui.card(card, "question", colour::kRaised);
     card = card.inset(10, 8);
-    const float high =
-        std::min(ui.paragraph_height(card.w, item.question, Type::bold), 0.5f * card.h);
-    ui.paragraph(card.take_top(high, 8), item.question, Type::bold, colour::kText, true);
+    const float high = ui.paragraph_height(width, item.question, type);
+    ui.paragraph(card.take_top(high, 8), item.question, type);
     for (std::size_t o = 0; o < item.options.size(); ++o) {
-        const std::string& option = item.options[o];
-        const float words = ui.paragraph_height(card.w - 24, option, Type::body);
-        const Box box = card.take_top(std::max(words + 16, 38.0f), 6);
-        if (box.h < 30) break;
+        const Box box = card.take_top(option_high(item.options[o], type), kBetween);
         const std::string id = "option" + std::to_string(o);
-        ButtonStyle style;
-        style.left = true;
-        style.may_cut = true;
-        style.enabled = input.live;
-        if (ui.button(id.c_str(), box, option, style))
+        if (wrapped_button(ui, id.c_str(), box, item.options[o], type, input.live))
             request.act =
                 Act{.kind = ActKind::answer, .index = question, .amount = static_cast<double>(o)};
     }
     ButtonStyle later;
     later.link = true;
     later.tip = "It is asked again when the next question is answered";
-    if (card.h >= 30)
-        request.put_off_question = ui.button(
-            "later", card.take_bottom(30).take_left(ui.width(tr("Later"), Type::body) + 16),
-            tr("Later"), later);
-    return true;
+    request.put_off_question =
+        ui.button("later", {card.x, card.y, ui.width(tr("Later"), Type::body) + 16, kLater},
+                  tr("Later"), later);
 }
 
 // The card while a procedure runs.
 void draw_procedure(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
     const ProcedureView& view = *input.procedure;
+    if (question_waits(input)) return draw_question(ui, room, input, request);
+    draw_tray(ui, room, input, request);  // before the steps: without it nothing can be done
     if (!input.exam) draw_procedure_steps(ui, room, input);
-    if (draw_question(ui, room, input, request)) return;
-    draw_tray(ui, room, input, request);
     const std::string done = done_words(input, view.state);
     if (!done.empty()) draw_small(ui, room, done, 0);
     if (!input.exam) {
@@ -452,7 +473,8 @@ TaskCardRequest draw_task_card(Ui& ui, const Box& card, const TaskCardInput& inp
         const bool pressed = draw_attempt_button(ui, room.take_bottom(48, 8), input);
         (input.replays ? request.end_replay : request.toggle_attempt) = pressed;
     }
-    draw_head(ui, room, input);
+    constexpr float kLowCard = 300;  // question or tray of a procedure need all of it
+    if (!shown_procedure(input) || room.h > kLowCard) draw_head(ui, room, input);
     if (!input.replays && !shown_procedure(input) && room.h > 150 &&
         (input.mouse || !input.attempt)) {
         Box links = room.take_bottom(44, 8);
