@@ -368,8 +368,10 @@ void ProcedureRun::aspirate(double ml, const Facts& f) {
         const double drawn = std::clamp(ml, 0.0, left);
         left -= drawn;
         state_.aspirated_ml += drawn;
-        return gives(
-            regions_[static_cast<std::size_t>(from)].look == TargetLook::abscess ? "pus" : "fluid");
+        const TargetLook look = regions_[static_cast<std::size_t>(from)].look;
+        return gives(look == TargetLook::abscess ? "pus"
+                     : look == TargetLook::calyx ? "urine"
+                                                 : "fluid");
     }
     if (f.depth_mm <= 0) return gives(f.needle_ok ? "air" : "nothing");
     switch (kind_[static_cast<std::size_t>(f.label)]) {
@@ -391,26 +393,29 @@ void ProcedureRun::core_throw(double mm, const Facts& f) {
     Point3 bled;
     bool bleeds = false;
     const int count = static_cast<int>(std::lround(mm / kThrowStepMm));
+    const auto take = [&](int region) {
+        const auto end = state_.taken.begin() + state_.taken_count;
+        const auto found =
+            std::find_if(state_.taken.begin(), end,
+                         [&](const ProcedureState::Taken& t) { return t.label == region; });
+        if (found != end)
+            found->mm += kThrowStepMm;
+        else if (state_.taken_count < ProcedureState::kMaxTaken)
+            state_.taken[static_cast<std::size_t>(state_.taken_count++)] = {region, kThrowStepMm};
+    };
     for (int i = 0; i < count; ++i) {
         const Point3 now = f.tip + (i + 0.5) * kThrowStepMm * f.direction;
         const Point3 rest = anatomy_->at_rest(now, f.time_s);
         const int label = anatomy_->label(rest);
-        int region = label;
-        for (std::size_t r = 0; r < regions_.size(); ++r)
-            if (regions_[r].look != TargetLook::none &&
-                distance(regions_[r].centre, rest) <= regions_[r].radius_mm)
-                region = -1 - static_cast<int>(r);
-        if (region != 0) {
-            const auto end = state_.taken.begin() + state_.taken_count;
-            const auto found =
-                std::find_if(state_.taken.begin(), end,
-                             [&](const ProcedureState::Taken& t) { return t.label == region; });
-            if (found != end)
-                found->mm += kThrowStepMm;
-            else if (state_.taken_count < ProcedureState::kMaxTaken)
-                state_.taken[static_cast<std::size_t>(state_.taken_count++)] = {region,
-                                                                                kThrowStepMm};
+        int tissue = label;
+        for (std::size_t r = 0; r < regions_.size(); ++r) {
+            if (distance(regions_[r].centre, rest) > regions_[r].radius_mm) continue;
+            if (regions_[r].look == TargetLook::none)
+                take(-1 - static_cast<int>(r));  // a place in a tissue, beside that
+            else
+                tissue = -1 - static_cast<int>(r);
         }
+        if (tissue != 0) take(tissue);
         switch (kind_[static_cast<std::size_t>(label)]) {
             case kArtery: happened(ComplicationKind::artery_punctured, f.time_s); [[fallthrough]];
             case kVein:

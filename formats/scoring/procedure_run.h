@@ -17,10 +17,10 @@
 //   inject      a ball of fluid in the tissue at the tip, at rest, volume kept; what is injected
 //               within 3 mm of a ball goes into it. Nothing goes into bone; in a vessel it is
 //               carried away and named as a complication
-//   aspirate    draws what the tip is in: blood, urine, bile, pus (an abscess), fluid (a cyst or
-//               calyx), air (lung, gas); from a collection it takes the volume away
-//   core_throw  takes what lies along the next 15 or 22 mm, looked up every half millimetre; a
-//               vessel in it bleeds
+//   aspirate    draws what the tip is in: blood, urine (also of a calyx), bile, pus (an abscess),
+//               fluid (a cyst), air (lung, gas); from a collection it takes the volume away
+//   core_throw  takes what lies along the next 15 or 22 mm, looked up every half millimetre, and
+//               the targets without a look of their own that it passes; a vessel in it bleeds
 //   wire        is in once the tip is in the body; withdrawn when all of it is drawn back. All
 //               but 50 mm of its 450 mm inside: lost
 //   dilate      over the wire
