@@ -37,6 +37,8 @@ Condition read_condition(const TomlTable& table, const Procedure& procedure, boo
     Condition c;
     c.given = true;
     table.texts("shows", c.shows, true);
+    if (table.number("shows_at_least", c.shows_at_least, 0.001, 1) && c.shows.empty())
+        table.add_fault("shows_at_least", "has no region", "expected shows = \"...\" beside it");
     table.texts("tip_in", c.tip_in, true);
     table.texts("tip_not_in", c.tip_not_in, true);
     read_flag(table, "needle_in", c.needle_in);

@@ -26,6 +26,7 @@ struct Label;
 // target, a finding or a label, "body", or the beginning of labels' names with * ("lung*").
 struct Condition {
     std::vector<std::string> shows;   // each is in the picture, not behind bone or gas
+    double shows_at_least = 0.01;     // of the picture, for each; a target shows by its middle
     std::vector<std::string> tip_in;  // the needle's tip is in one of these
     std::vector<std::string> tip_not_in;
     // -1: not asked for; 0: must not; 1: must.

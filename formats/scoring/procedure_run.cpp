@@ -15,8 +15,7 @@
 namespace sonocase {
 namespace {
 
-constexpr double kShownShare = 0.01;  // of the looked-up points: a region this large is shown
-constexpr double kTargetSlabMm = 5;   // as ScoreOptions::target_slab_mm
+constexpr double kTargetSlabMm = 5;  // as ScoreOptions::target_slab_mm
 constexpr int kLookLines = 13, kLookRows = 40;
 constexpr double kPoolReachMm = 3;
 constexpr double kThrowStepMm = 0.5;
@@ -211,7 +210,7 @@ bool ProcedureRun::in(const Regions& regions, const Facts& f) const {
     return false;
 }
 
-bool ProcedureRun::shown(const Regions& regions, const Facts& f) {
+bool ProcedureRun::shown(const Regions& regions, double at_least, const Facts& f) {
     if (!f.probe_ok) return false;
     for (std::size_t r = 0; r < regions_.size() && r < 64; ++r) {
         if ((regions.targets >> r & 1) == 0) continue;
@@ -227,7 +226,7 @@ bool ProcedureRun::shown(const Regions& regions, const Facts& f) {
     int points = 0;
     for (std::size_t l = 1; l < seen_.size(); ++l)
         if (regions.labels.test(l)) points += seen_[l];
-    return points > kShownShare * looked_ && points > 0;
+    return points > at_least * looked_ && points > 0;
 }
 
 // Everything but the act and hold_s.
@@ -270,7 +269,7 @@ bool ProcedureRun::holds(const Watch& w, const Facts& f) {
     if (!w.tip_in.empty && !in(w.tip_in, f)) return false;
     if (!w.tip_not_in.empty && in(w.tip_not_in, f)) return false;
     for (const Regions& regions : w.shows)
-        if (!shown(regions, f)) return false;
+        if (!shown(regions, c.shows_at_least, f)) return false;
     return true;
 }
 

@@ -219,7 +219,7 @@ class ProcedureRun {
     Watch watch(const Condition& condition, const std::vector<Label>& labels) const;
     void look(const Facts& facts);
     bool in(const Regions& regions, const Facts& facts) const;
-    bool shown(const Regions& regions, const Facts& facts);
+    bool shown(const Regions& regions, double at_least, const Facts& facts);
     bool holds(const Watch& watch, const Facts& facts);
     // Whether the condition is fulfilled now, with its act and its hold_s.
     bool fulfilled(const Watch& watch, const Facts& facts, double& amount, double& since_s);
