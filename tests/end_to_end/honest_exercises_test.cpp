@@ -154,5 +154,28 @@ TEST(HonestExercises, ScriptsOfTheWomanPassTheirMarks) {
                                                 " --set resample.voxel_mm=2")));
 }
 
+// The experts of the procedures pass where a trainee meets them: cooked, on the mannequin, through
+// the player.
+TEST(HonestExercises, ExpertsPassTheProceduresInThePlayer) {
+    const testing::TemporaryFolder folder;
+    const std::string path =
+        cooked(folder, std::string(SONOCASE_SOURCE) + "/scenarios/procedures --preset draft");
+    for (const Exercise& exercise : Case(path).exercises) {
+        const std::string stats = folder / (exercise.name + ".json");
+        const auto run = testing::run_command(
+            std::string(SONOCASE_BIN) + "/sonoplay " + path + " --exercise " + exercise.name +
+            " --headless --tracker sweep:expert --model paper --size 64x64 --frames 720 --record " +
+            (folder / (exercise.name + ".igs.mha")) + " --stats " + stats);
+        ASSERT_EQ(run.status, 0) << run.error;
+        const std::string text = testing::read_text(stats);
+        const std::size_t list = text.find("\"procedure\"");
+        ASSERT_NE(list, std::string::npos) << exercise.name;
+        const std::string item = "\"ticked\": false";
+        EXPECT_EQ(text.find(item, list), std::string::npos)
+            << exercise.name << ": " << text.substr(list);
+        EXPECT_NE(text.find("\"ticked\": true", list), std::string::npos);
+    }
+}
+
 }  // namespace
 }  // namespace sonocase
