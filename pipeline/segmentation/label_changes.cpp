@@ -47,7 +47,7 @@ void report_changes(const std::vector<LabelChange>& changes,
                           "label %s (%.3g ml) has no voxel left%s; choose a smaller voxel",
                           c.name.c_str(), c.volume_before_ml, why.c_str());
             report->warnings.emplace_back(line);
-        } else if (change > warn_above) {
+        } else if (change > (c.volume_before_ml < kSmallMl ? 1.5 : 1) * warn_above) {
             std::snprintf(
                 line, sizeof line,
                 "label %s went from %.3g to %.3g ml (%+.0f %%)%s; choose a smaller voxel or "

@@ -27,12 +27,12 @@ using sonocase::testing::run_command;
 
 // Bundles: since the quadratic starts from the rigid pose. Physical frames: since pictures open
 // bright. Paper frames: of these bundles and of scripts that keep clear of ribs.
-constexpr const char* kDraft = "6bf9a8ee03934733ed47e01c367b8b98";
-constexpr const char* kBalanced = "04b50aec14f46b23dde9658295ce7494";
-constexpr const char* kSlender = "a37d2566532f9f8bb2c22b8911936f26";
+constexpr const char* kDraft = "02da38270e7b1c8c315440c4dd19a094";
+constexpr const char* kBalanced = "dbb718a8b1d131c454eca31d29705ad7";
+constexpr const char* kSlender = "5b5d1a1d41fc5b68cdc453ee2d23cead";
 constexpr const char* kReal = "1e286110ef6a985496a9c4efa77a28b6";
-constexpr const char* kDraftPhysical = "04c513a0c724f5b01a7f9aee8143b092";
-constexpr const char* kDraftPaper = "f39d1b64d8ba65288724451ca242d680";
+constexpr const char* kDraftPhysical = "bbac81035b7285645df743db6ee77470";
+constexpr const char* kDraftPaper = "1aaccd9bf66881ec2231c9c0ceb219e6";
 constexpr const char* kRealPhysical = "5d4803c85e13541b869f72a19c65049e";
 constexpr const char* kRealPaper = "9d091264755ea3c9784d9df979e66233";
 
