@@ -337,6 +337,40 @@ await run_tests({
         await page.close();
         for (const one of [store, its_server]) { one.closeAllConnections?.(); one.close(); }
     },
+    async a_procedure_is_asked_done_and_ticked() {
+        const procedures = join(work, 'procedures.sonocase'), its_site = join(work, 'procedures');
+        const scenario = new URL('../../../scenarios/procedures', import.meta.url).pathname;
+        run(join(bin, 'sonocase'), 'build', scenario, '--preset', 'draft', '--quiet', '-o', procedures);
+        run(join(bin, 'sonocase'), 'publish', procedures, '-o', its_site, '--program', program);
+        const [its_server, its_url] = await serve(its_site);
+        const page = await browser.page();
+        await page.open(`${its_url}?case=procedures&exercise=liver-biopsy`);
+        await page.until(`${kFrames} > 0 && sonoplay.app.scan.complete`);
+        const text = (id) => page.value(`document.getElementById("${id}").textContent`);
+        expect(await page.value('document.getElementById("procedure").hidden'), 'no procedure before the attempt');
+        await page.key('KeyB');
+        await page.until('!document.getElementById("question").hidden');
+        expect_equal(await page.value('document.querySelectorAll("#steps li").length'), 5, 'steps');
+        expect((await text('question-words')).includes('INR'), 'the question');
+        await page.value('document.querySelectorAll("#options button")[1].click()');
+        await page.until('document.getElementById("question").hidden');
+        await page.value('document.querySelector("#tray button").click()');
+        await page.until('document.getElementById("hands-words").textContent === "1 ml injected"');
+        await page.key('KeyJ');
+        await page.until('document.getElementById("hands-words").textContent === "2 ml injected"');
+        await page.until(`${seconds_attempt} > 5.2`);
+        await page.key('KeyB');
+        await page.until('sonoplay.app.settled === sonoplay.app.started');
+        const lines = await page.value('[...document.querySelectorAll("#checklist tr")].map((line) => line.textContent)');
+        expect_equal(lines.length, 9, 'items');
+        expect_equal(lines.filter((line) => line.startsWith('Clotting') && line.includes('done')).length, 1, 'the answer counts');
+        expect(lines.some((line) => line.startsWith('Core') && line.includes('not done')), 'what was left out is named');
+        expect_equal(await text('verdict'), 'Not passed yet', 'verdict');
+        expect_equal(page.errors.join(), '', 'errors on the console');
+        await page.close();
+        its_server.closeAllConnections?.();
+        its_server.close();
+    },
     async one_page_opens_from_disk() {
         const file = join(work, 'one.html');
         run(join(bin, 'sonocase'), 'publish', case_file, '-o', file, '--single-file', '--program', program);
