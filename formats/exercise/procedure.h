@@ -97,9 +97,9 @@ struct SceneChange {
         double radius_mm = 0;
         bool blood = false;  // fresh blood, with echoes; otherwise clear
     };
-    struct Line {  // a wire or a catheter
+    struct Line {  // a wire or a catheter: from the skin to where it turns, and on to its end
         bool in = false;
-        Point3 from, to;
+        Point3 from, turn, to;
     };
     std::array<Pool, kMaxPools> pools{};
     int pool_count = 0;

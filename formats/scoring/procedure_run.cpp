@@ -431,6 +431,38 @@ void ProcedureRun::core_throw(double mm, const Facts& f) {
     if (bleeds) bleed(bled, f.time_s);
 }
 
+// The end of a wire that is `mm` beyond the tip. The directions tried are those of the half space
+// ahead, so that it never turns back on the needle.
+Point3 ProcedureRun::wire_end(const Facts& f, double mm) const {
+    const Kind kind = kind_[static_cast<std::size_t>(f.label)];
+    const bool fluid = f.region >= 0 && full_ml_[static_cast<std::size_t>(f.region)] > 0;
+    const bool hollow =
+        fluid || kind == kArtery || kind == kVein || kind == kUrine || kind == kBile;
+    if (!anatomy_ || !hollow) return f.tip_rest + mm * f.direction;
+    const auto inside = [&](Point3 p) {
+        if (!fluid) return anatomy_->label(p) == f.label;
+        const Target& ball = regions_[static_cast<std::size_t>(f.region)];
+        return distance(ball.centre, p) <= ball.radius_mm;
+    };
+    constexpr double kStepMm = 1, kGoldenAngle = 2.399963229728653;
+    constexpr int kDirections = 96;
+    const Vector3 x = any_perpendicular(f.direction), y = cross(f.direction, x);
+    Point3 end = f.tip_rest;
+    double longest = 0;
+    for (int i = 0; i < kDirections && longest < mm; ++i) {
+        const double ahead = 1 - (i + 0.5) / kDirections, across = std::sqrt(1 - ahead * ahead);
+        const Vector3 way = ahead * f.direction +
+                            across * (cosine(kGoldenAngle * i) * x + sine(kGoldenAngle * i) * y);
+        double length = 0;
+        while (length + kStepMm <= mm && inside(f.tip_rest + (length + kStepMm) * way))
+            length += kStepMm;
+        if (length <= longest) continue;
+        longest = length;
+        end = f.tip_rest + length * way;
+    }
+    return end;
+}
+
 void ProcedureRun::act(const Act& act, const Facts& f) {
     if (!std::isfinite(act.amount)) return;
     switch (act.kind) {
@@ -441,7 +473,7 @@ void ProcedureRun::act(const Act& act, const Facts& f) {
             if (!state_.wire_in) {
                 if (!(act.amount > 0) || f.depth_mm <= 0) return;
                 state_.wire_label = f.label;
-                wire_ = {true, f.skin, f.tip};
+                wire_ = {true, f.skin, f.tip_rest, f.tip_rest};
                 if (anatomy_) wire_.from = anatomy_->at_rest(f.skin, f.time_s);
             }
             state_.wire_mm = std::clamp(state_.wire_mm + act.amount, 0.0, kWireMm);
@@ -449,14 +481,16 @@ void ProcedureRun::act(const Act& act, const Facts& f) {
             if (state_.wire_mm > kWireMm - kWireHeldMm)
                 happened(ComplicationKind::wire_lost, f.time_s);
             wire_.in = state_.wire_in;
-            if (f.depth_mm > 0 && act.amount > 0)
-                wire_.to = f.tip_rest + std::min(state_.wire_mm, kShownWireMm) * f.direction;
+            if (f.depth_mm > 0 && act.amount > 0) {
+                wire_.turn = f.tip_rest;
+                wire_.to = wire_end(f, std::min(state_.wire_mm, kShownWireMm));
+            }
             return;
         case ActKind::dilate:
             if (act.amount > 0 && state_.wire_in &&
                 kind_[static_cast<std::size_t>(state_.wire_label)] == kArtery) {
                 happened(ComplicationKind::artery_dilated, f.time_s);
-                bleed(wire_.from + 0.8 * (wire_.to - wire_.from), f.time_s);
+                bleed(wire_.turn, f.time_s);
             }
             return;
         case ActKind::catheter: {
@@ -468,7 +502,7 @@ void ProcedureRun::act(const Act& act, const Facts& f) {
                 catheter_ = wire_;
             } else {
                 catheter_ = {true, anatomy_ ? anatomy_->at_rest(f.skin, f.time_s) : f.skin,
-                             f.tip_rest};
+                             f.tip_rest, f.tip_rest};
                 if (f.region >= 0 && full_ml_[static_cast<std::size_t>(f.region)] > 0)
                     catheter_region_ = f.region;
             }

@@ -22,7 +22,8 @@
 //   core_throw  takes what lies along the next 15 or 22 mm, looked up every half millimetre, and
 //               the targets without a look of their own that it passes; a vessel in it bleeds
 //   wire        is in once the tip is in the body; withdrawn when all of it is drawn back. All
-//               but 50 mm of its 450 mm inside: lost
+//               but 50 mm of its 450 mm inside: lost. In a vessel or a collection it turns at the
+//               tip to where that is longest; elsewhere it goes on straight
 //   dilate      over the wire
 //   catheter    over the wire, or over the needle where there is no wire; lies at the tip
 //   drain       lets fluid out of the collection that catheter or tip lie in, as long as there is
@@ -229,6 +230,7 @@ class ProcedureRun {
     void aspirate(double ml, const Facts& facts);
     void core_throw(double mm, const Facts& facts);
     void bleed(Point3 rest, double time_s);
+    Point3 wire_end(const Facts& facts, double mm) const;
     int collection(const Facts& facts) const;
     void happened(ComplicationKind kind, double time_s);
     void watch_needle(const Facts& facts);

@@ -242,6 +242,11 @@ TEST_F(PressingExercises, TheirSweepsStandWhereTheVeinCloses) {
     EXPECT_FALSE(play("femoral-compression", needle(0)).passed);
 }
 
+// The line in the vein: pressed, punctured, wire, dilator, catheter.
+TEST_F(PressingExercises, TheExpertOfTheFemoralLineTicksAll) {
+    sonocase::testing::expect_expert_ticks_all(open_->path, "femoral-line");
+}
+
 // What a recording says of tissue and needle.
 std::vector<std::string> tissue_events(const std::string& path) {
     const auto sequence = load_sequence(path);

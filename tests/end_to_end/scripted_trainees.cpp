@@ -6,10 +6,15 @@
 #include <cmath>
 #include <vector>
 
+#include <gtest/gtest.h>
+
 #include "formats/base/constants.h"
 #include "formats/scoring/sight.h"
 #include "formats/volume/tissue.h"
 #include "runtime/tracking/scripted_sweep.h"
+#include "support/paths.h"
+#include "support/run_command.h"
+#include "support/temporary_folder.h"
 
 namespace sonocase::testing {
 
@@ -312,6 +317,23 @@ std::vector<MouseTracker> look_as_an_expert(Attempt& attempt) {
 
 bool play_as_an_expert(Attempt& attempt) {
     return Expert(attempt).play();
+}
+
+void expect_expert_ticks_all(const std::string& bundle, const std::string& exercise) {
+    const TemporaryFolder folder;
+    const std::string stats = folder / "stats.json";
+    const auto run =
+        run_command(std::string(SONOCASE_BIN) + "/sonoplay " + bundle + " --exercise " + exercise +
+                    " --headless --tracker sweep:expert --model paper --size 64x64 "
+                    "--frames 720 --record " +
+                    (folder / "attempt.igs.mha") + " --stats " + stats);
+    ASSERT_EQ(run.status, 0) << run.error;
+    const std::string text = read_text(stats);
+    const std::size_t list = text.find("\"procedure\"");
+    ASSERT_NE(list, std::string::npos) << exercise;
+    EXPECT_NE(text.find("\"ticked\": true", list), std::string::npos) << exercise;
+    EXPECT_EQ(text.find("\"ticked\": false", list), std::string::npos)
+        << exercise << ": " << text.substr(list);
 }
 
 }  // namespace sonocase::testing

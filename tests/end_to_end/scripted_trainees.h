@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "formats/bundle/case_bundle.h"
@@ -95,6 +96,9 @@ struct ExpertPlan {
 std::optional<ExpertPlan> plan_as_an_expert(Attempt& attempt);
 // The probe alone over the target: some ways to hold it there.
 std::vector<runtime::MouseTracker> look_as_an_expert(Attempt& attempt);
+
+// The player plays the script "expert" of a procedure of this bundle: every item is ticked.
+void expect_expert_ticks_all(const std::string& bundle, const std::string& exercise);
 
 // False if the expert found no picture with a free way to the target, and did not try.
 bool play_as_an_expert(Attempt& attempt);

@@ -333,13 +333,13 @@ void balls_of_frame(const PhysicalScene& scene,
         balls.push_back(ball);
     }
     // An ellipsoid as long as the line; as thick as the slab shows it at least.
-    const auto add_line = [&](const SceneChange::Line& line, double radius_mm, int acoustics,
+    const auto add_part = [&](Point3 from, Point3 to, double radius_mm, int acoustics,
                               double wall) {
-        const Vector3 along = line.to - line.from;
+        const Vector3 along = to - from;
         const double half_mm = 0.5 * norm(along);
-        if (!line.in || !(half_mm > radius_mm)) return;
+        if (!(half_mm > radius_mm)) return;
         TargetBall ball;
-        ball.centre_vx = scene.grid.voxel_from_point(line.from + 0.5 * along);
+        ball.centre_vx = scene.grid.voxel_from_point(from + 0.5 * along);
         ball.radius_mm = radius_mm;
         ball.reach_mm = half_mm;
         ball.round = false;
@@ -352,8 +352,14 @@ void balls_of_frame(const PhysicalScene& scene,
         ball.anywhere = true;
         balls.push_back(ball);
     };
+    const auto add_line = [&](const SceneChange::Line& line, double radius_mm, int acoustics,
+                              double wall) {
+        if (!line.in) return;
+        add_part(line.from, line.turn, radius_mm, acoustics, wall);
+        add_part(line.turn, line.to, radius_mm, acoustics, wall);
+    };
     add_line(change.catheter, 1.5, scene.catheter, 14);
-    add_line(change.wire, 0.8, scene.wire, 20);
+    add_line(change.wire, 0.5, scene.wire, 20);
 }
 
 }  // namespace sonocase::runtime

@@ -121,7 +121,7 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
 // The balls of a frame: the scene's, with the exercise's targets as large as they still are, and
 // what acts have put between them. first_target: number of shown lesions before the targets.
 // balls: cleared; allocates nothing within kMaxFrameBalls.
-inline constexpr std::size_t kMaxFrameBalls = physical::kMaxTargets + SceneChange::kMaxPools + 2;
+inline constexpr std::size_t kMaxFrameBalls = physical::kMaxTargets + SceneChange::kMaxPools + 4;
 void balls_of_frame(const PhysicalScene& scene,
                     const SceneChange& change,
                     int first_target,
