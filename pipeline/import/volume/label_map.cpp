@@ -238,6 +238,7 @@ BodySummary summary_of(const StructureList& list, double scale) {
             sum = sum + run.count * at;
             squares = squares + run.count * Vector3{at.x * at.x, at.y * at.y, at.z * at.z};
             const double half = std::min(0.5 * (run.count - 1.0), 0.5 * (grid.size.x - 1.0));
+            squares.x += run.count * half * (half + 1) / 3;
             box.include(Point3{std::max(0.0, at.x - half), at.y, at.z});
             box.include(Point3{std::min(grid.size.x - 1.0, at.x + half), at.y, at.z});
         }
@@ -252,8 +253,7 @@ BodySummary summary_of(const StructureList& list, double scale) {
         for (int axis = 0; axis < 3; ++axis) {
             const double spread =
                 squares[axis] / static_cast<double>(s.voxels) - mean[axis] * mean[axis];
-            one.length_mm = std::max(one.length_mm,
-                                     std::sqrt(12 * std::max(spread, 0.0)) * body.voxel_mm[axis]);
+            one.length_mm[axis] = std::sqrt(12 * std::max(spread, 0.0) + 1) * body.voxel_mm[axis];
             const auto a = static_cast<std::size_t>(axis);
             one.cut_low[a] = box.lower[axis] < 1;
             one.cut_high[a] = box.upper[axis] > grid.size[axis] - 2;
