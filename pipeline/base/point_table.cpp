@@ -382,6 +382,10 @@ bool is_hole(std::string_view cell) {
                             "no data", "nodata"});
 }
 
+bool is_digits(std::string_view cell) {
+    return cell.find_first_not_of("+-0123456789") == cell.npos;
+}
+
 bool is_ok(std::string_view status) {
     return is_one_of(lower_case(status), {"ok", "valid", "tracked", "good", "visible", "enabled"});
 }
@@ -679,7 +683,7 @@ class Parser {
     Status read_nameless(PointTable& table) {
         std::size_t count = 0;
         bool first_is_word = false;
-        bool unit_normals = true, colours = true;
+        bool unit_normals = true, colours = true, whole = true;
         std::vector<double> first_column;
         const Line* first_line = nullptr;
         for (std::size_t n = layout_.first; n < lines_.size(); ++n) {
@@ -711,6 +715,10 @@ class Parser {
                                  std::to_string(count),
                              place(line), "give every row the same columns"};
             if (const auto value = cells_.number(0)) first_column.push_back(*value);
+            for (std::size_t c = 0; c < 3 && whole; ++c) {
+                const auto value = cells_.number(c);
+                whole = !value || (*value == std::floor(*value) && is_digits(cells_[c]));
+            }
             if (count == 6) {
                 double square = 0;
                 for (std::size_t c = 3; c < 6; ++c) {
@@ -725,6 +733,14 @@ class Parser {
             keep(table, ok, point);
         }
         if (first_line == nullptr) return Done{};
+        if (count == 6 && whole && layout_.separator == ',') {
+            cells_.split(first_line->text, layout_.separator);
+            return Error{
+                "6 columns of whole numbers: is a decimal comma among them? " + cell_list(cells_),
+                place(*first_line),
+                "put ';' between numbers with a decimal comma, or above the first row the "
+                "line of names that is true: 'x,y,z,c4,c5,c6'"};
+        }
         if (count == 6 && !unit_normals) {
             layout_.columns.normal = {-1, -1, -1};
             table.normals.clear();

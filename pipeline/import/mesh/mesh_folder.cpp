@@ -28,7 +28,9 @@ std::vector<std::string> mesh_files(const std::string& path) {
     if (!fs::is_directory(path, code)) return {path};
     std::vector<std::string> files;
     for (const auto& entry : fs::directory_iterator(path, code))
-        if (is_mesh_file(entry.path().string())) files.push_back(entry.path().string());
+        if (!entry.path().filename().string().starts_with('.') &&  // those of macOS, "._liver.stl"
+            is_mesh_file(entry.path().string()))
+            files.push_back(entry.path().string());
     std::sort(files.begin(), files.end());
     return files;
 }

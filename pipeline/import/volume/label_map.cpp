@@ -21,6 +21,7 @@
 #include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/base/source_checks.h"
 #include "pipeline/base/stopwatch.h"
+#include "pipeline/base/text.h"
 #include "pipeline/import/volume/label_numbering.h"
 #include "pipeline/import/volume/native_volume.h"
 #include "pipeline/import/volume/nifti_file.h"
@@ -331,6 +332,41 @@ Status assume_names(const std::string& path,
     return Done{};
 }
 
+bool holds(const Structure& structure, std::uint64_t voxel) {
+    const auto after =
+        std::upper_bound(structure.runs.begin(), structure.runs.end(), voxel,
+                         [](std::uint64_t v, const VoxelRun& run) { return v < run.first; });
+    return after != structure.runs.begin() &&
+           voxel - std::prev(after)->first < std::prev(after)->count;
+}
+
+// Some programs write the outside as a label of its own: -1, 255, "Exterior". Only 0 is outside
+// here.
+void leave_out_background(StructureList& list) {
+    const Grid& grid = list.grid;
+    std::uint64_t labelled = 0;
+    for (const Structure& s : list.structures) labelled += s.voxels;
+    std::erase_if(list.structures, [&](const Structure& s) {
+        const std::string name = lower_case(s.entry.name);
+        bool outside = name == "background" || name == "exterior" || name == "clear label" ||
+                       name == "clear_label" || name == "unlabeled" || name == "unlabelled";
+        if (!outside && name.empty() && labelled == grid.voxel_count()) {
+            outside = true;
+            for (int corner = 0; corner < 8; ++corner)
+                outside = outside && holds(s, grid.index((corner & 1) ? grid.size.x - 1 : 0,
+                                                         (corner & 2) ? grid.size.y - 1 : 0,
+                                                         (corner & 4) ? grid.size.z - 1 : 0));
+        }
+        if (outside && s.voxels > 0)
+            list.warnings.push_back(
+                "value " + std::to_string(s.entry.value) +
+                (name.empty() ? " holds all corners of the map, and no voxel is 0: it is"
+                              : " ('" + s.entry.name + "') is") +
+                " taken as the outside; if it is a structure, give it a name with --table");
+        return outside;
+    });
+}
+
 // Reads a single file or a DICOM series.
 Result<StructureList> read_label_file(const std::string& path, const ImportOptions& options) {
     SONOCASE_TRY(auto file, read_label_layers(path, options.reading));
@@ -391,6 +427,7 @@ Result<StructureList> read_label_file(const std::string& path, const ImportOptio
         const std::string_view total = totalsegmentator_name(value);
         unlike_total = unlike_total || (!total.empty() && structure.entry.name != total);
     }
+    leave_out_background(list);
     // Segments and names unlike TotalSegmentator's say that it did not number the values.
     if (sources.segments.empty() && !unlike_total) {
         SONOCASE_TRY_DONE(assume_names(path, options, none_named, list));
@@ -402,7 +439,9 @@ bool is_mask_folder(const std::string& path) {
     std::error_code code;
     if (!fs::is_directory(path, code)) return false;
     for (const auto& entry : fs::directory_iterator(path, code))
-        if (is_volume_file_name(entry.path().string())) return true;
+        if (!entry.path().filename().string().starts_with('.') &&
+            is_volume_file_name(entry.path().string()))
+            return true;
     return false;
 }
 
