@@ -41,6 +41,14 @@ std::vector<Line> lines_of(std::string_view text) {
             line.remove_prefix(1);
         while (!line.empty() && line.back() == ' ') line.remove_suffix(1);
         if (trimmed(line).empty()) continue;
+        // "[1, 2, 3]," and "(1, 2, 3)" as programs print them.
+        if (line.front() == '[' || line.front() == '(') {
+            const std::size_t end = line.find_last_not_of(",; ");
+            const char last = line[end];
+            if ((last == ']' || last == ')') && line.find_first_of("[(", 1) == line.npos)
+                line = trimmed(line.substr(1, end - 1));
+            if (line.empty()) continue;
+        }
         const bool comment = line.front() == '#' || line.front() == '%' || line.starts_with("//");
         if (comment)
             line = trimmed(line.substr(std::min(line.find_first_not_of("#%/"), line.size())));
@@ -355,6 +363,10 @@ std::string reading(std::initializer_list<const char*> first, std::size_t count)
 }
 
 Error which_columns(std::size_t count, const std::string& why, const std::string& place) {
+    constexpr std::size_t kMany = 40;  // of one row: a list of numbers, or poses as matrices
+    if (count > kMany)
+        return Error{"which columns are x, y and z? " + why, place,
+                     "write one point in each row, with x,y,z above the first"};
     std::string readings = reading({"x", "y", "z"}, count);
     if (count == 4) {
         readings += " or " + reading({"n", "x", "y", "z"}, count) + " or " +

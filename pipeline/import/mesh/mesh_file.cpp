@@ -272,11 +272,19 @@ bool names_no_vertex(vtkPolyData& data) {
     return false;
 }
 
-// The comments of an OBJ, whichever line they stand in.
+// The comments of an OBJ, whichever line they stand in. VTK takes "1,5" for 1 and says nothing:
+// coordinates are looked at here.
 Result<Axes> axes_of_obj(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
     Axes axes = Axes::unsaid;
+    int number = 0;
     for (std::string line; std::getline(file, line);) {
+        ++number;
+        if (line.starts_with("v ") && line.find(',') != std::string::npos)
+            return Error{"a vertex has a comma among its numbers: " + line.substr(0, 40),
+                         path + ":" + std::to_string(number),
+                         "write decimal points: choose English as language of the program that "
+                         "exports it"};
         if (!line.starts_with("#")) continue;
         SONOCASE_TRY(const Axes said, axes_said(line, path));
         if (said != Axes::unsaid) axes = said;

@@ -167,7 +167,7 @@ Result<Header> parse_header(const std::string& bytes, const std::string& path) {
             property.is_list = type == "list";
             if (property.is_list) line >> count_type >> type;
             line >> name;
-            property.name = name;
+            property.name = lower_case(name);
             if (!line || header.elements.empty() || !type_named(type, &property.type) ||
                 (property.is_list && !type_named(count_type, &property.count_type)))
                 return bad("PLY header, line " + std::to_string(line_number) +
@@ -183,6 +183,11 @@ Result<Header> parse_header(const std::string& bytes, const std::string& path) {
                              [&](const Property& p) { return p.name == axis && !p.is_list; }))
                 return bad(std::string("vertices of a PLY file without the property ") + axis);
     return header;
+}
+
+Error no_such_vertex(std::uint64_t face, const std::string& path) {
+    return {"face " + std::to_string(face) + " names a vertex that does not exist", path,
+            "check that the file is complete; export it again"};
 }
 
 // The corners of strips one after another, as VTK's cells and Stanford's old scans have them; -1
@@ -260,10 +265,7 @@ Result<PolygonFile> read_ply_file(const std::string& path) {
                         strip.push_back(corner);
                         continue;
                     }
-                    if (!(corner >= 0) || corner >= static_cast<double>(file.points.size()))
-                        return Error{
-                            "face " + std::to_string(n) + " names a vertex that does not exist",
-                            path, "check that the file is complete; export it again"};
+                    if (!(corner >= 0) || corner > UINT32_MAX) return no_such_vertex(n, path);
                     if (is_strip)
                         strip.push_back(corner);
                     else
@@ -282,6 +284,13 @@ Result<PolygonFile> read_ply_file(const std::string& path) {
             if (has_normals) file.normals.push_back(normal);
         }
     }
+    // Faces may stand before the vertices.
+    for (std::size_t c = 0; c < file.corners.size(); ++c)
+        if (file.corners[c] >= file.points.size())
+            return no_such_vertex(
+                static_cast<std::uint64_t>(std::upper_bound(file.ends.begin(), file.ends.end(), c) -
+                                           file.ends.begin()),
+                path);
     if (file.normals.size() != file.points.size()) file.normals.clear();
     return file;
 }

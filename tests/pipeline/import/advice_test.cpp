@@ -111,6 +111,20 @@ TEST_F(Advice, OfFilesLeadsToFilesThatAreRead) {
         expect("", "export it again", map(name, bytes.substr(0, bytes.size() - 9)),
                map(name, bytes));
     }
+    expect("a pointer of Git LFS", "git lfs pull",
+           map("l.nii.gz", "version https://git-lfs.github.com/spec/v1\noid sha256:4d\nsize 9\n"),
+           map("l.nii.gz", testing::gzip_bytes(good_)));
+    expect("is a web page", "download the file itself",
+           map("w.nii.gz", "\n<!DOCTYPE html><html>Sign in</html>"),
+           map("w.nii.gz", testing::gzip_bytes(good_)));
+    expect("is a zip archive", "unpack it", map("z.nrrd", "PK\x03\x04" + std::string(60, 'x')),
+           map("z.nrrd", testing::nrrd_bytes(volume_)));
+    const auto longer = import_label_map(folder_.write("b.nii", good_ + good_.substr(352)));
+    ASSERT_TRUE(longer);  // voxels of two bytes under a header of one, say
+    ASSERT_FALSE(longer->report.warnings.empty());
+    EXPECT_NE(longer->report.warnings[0].find("12288 bytes more than its header asks for"),
+              std::string::npos)
+        << longer->report.warnings[0];
     expect("every voxel is 0", "the right file",
            map("z.nii", nifti_of<std::uint8_t>(2, [](std::size_t, int) { return 0; })),
            map("z.nii", good_));

@@ -94,6 +94,8 @@ TEST(PointTable, ReadsNamelessColumnsThatCanMeanOneThing) {
     for (const auto& [what, text] :
          {std::pair<const char*, std::string>{"three", rows("", "", " ")},
           {"count", "10\n" + rows("", "", " ")},
+          {"brackets", rows("[", "],", ", ")},
+          {"parentheses", rows("(", ")", ", ")},
           {"decimal commas", with_commas(rows("", "", " "))},
           {"normals", rows("", " 0 0.6 0.8", " ")},
           {"colours", rows("", ",255,0,12", ",")},

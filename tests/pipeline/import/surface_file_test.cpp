@@ -402,6 +402,16 @@ TEST(ImportSurface, ReadsTheFormsOfOtherPrograms) {
         {"strips.ply", strips},
         {"returns.ply", replaced_all(ply, "\n", "\r")},
         {"pairs.ply", replaced_all(ply, "\n", "\r\n")},
+        {"capitals.ply",
+         replaced(replaced(ply, "property float x", "property float X"), "float y", "float Y")},
+        {"faces-first.ply", ply.substr(0, ply.find("element vertex")) +
+                                ply.substr(ply.find("element face"),
+                                           ply.find("end_header") - ply.find("element face")) +
+                                ply.substr(ply.find("element vertex"),
+                                           ply.find("element face") - ply.find("element vertex")) +
+                                "end_header\n" + ply.substr(ply.find("\n3 ") + 1) +
+                                ply.substr(ply.find("end_header\n") + 11,
+                                           ply.find("\n3 ") + 1 - ply.find("end_header\n") - 11)},
         {"index.ply", replaced(ply, "vertex_indices", "vertex_index")},
         {"colours.obj", colours + faces},
         {"negative.obj", vertices + negative},
@@ -491,6 +501,8 @@ TEST(ImportSurfaceRefuses, WithAdviceThatWorks) {
          replaced(vtk, "POLYDATA", "UNSTRUCTURED_GRID"), vtk},
         {"a.vtp", "cannot be read as VTP", "export it again", "<VTKFile", vtp_text(mesh)},
         {"a.obj", "no points", "the right file", "# nothing\n", obj},
+        {"a.obj", "a comma among its numbers: v 10,0", "decimal points",
+         replaced(obj, "v 10 ", "v 10,0 "), obj},
     };
     for (const auto& c : cases) {
         const auto refused = import_surface(folder.write(c.name, c.given), c.options);
