@@ -36,7 +36,10 @@ Status expect_no_foreign(const std::string& path) {
           {"Rar!", "a RAR archive"},
           {"%PDF", "a PDF"}})
         if (head.starts_with(sign))
-            return Error{std::string("is ") + kind, path, "unpack it, and give what it holds"};
+            return lower_case(path).ends_with(".xlsx") || lower_case(path).ends_with(".ods")
+                       ? Error{"is a spreadsheet", path, "save the table as CSV UTF-8"}
+                       : Error{std::string("is ") + kind, path,
+                               "unpack it, and give what it holds"};
     return Done{};
 }
 

@@ -62,7 +62,8 @@ const LabelTableEntry* entry_of(const LabelTable& table, int value) {
 Status check_table(const LabelTable& table, const std::string& where) {
     for (std::size_t i = 0; i < table.size(); ++i)
         for (std::size_t j = i + 1; j < table.size(); ++j)
-            if (table[i].value == table[j].value && table[i].layer == table[j].layer)
+            if (table[i].value == table[j].value && table[i].layer == table[j].layer &&
+                table[i].name != table[j].name)
                 return Error{"value " + std::to_string(table[i].value) + " has two names, '" +
                                  table[i].name + "' and '" + table[j].name + "'",
                              where, "give each value one row"};

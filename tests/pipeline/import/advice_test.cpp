@@ -253,6 +253,12 @@ TEST_F(Advice, OfTablesLeadsToNames) {
                                    "Gr\xF6\xDF"
                                    "e")),
            table("t.csv", replaced(good, "liver", "Größe")));
+    expect("row of 4 cells under 3 names", "in quotation marks",
+           table("t.csv", "name,value,note\nleft, lung,1,x\n"),
+           table("t.csv", "name,value,note\n\"left, lung\",1,x\n"));
+    expect("is a spreadsheet", "as CSV UTF-8", table("t.xlsx", "PK\x03\x04" + std::string(60, 'x')),
+           named);
+    expect("is a web page", "download", table("t.csv", "<!DOCTYPE html>\n<html>"), named);
     expect("", "labels", table("t.json", "{\"labels\": {}}"),
            table("t.json", "{\"labels\": {\"liver\": 5, \"spleen\": 1, \"kidney_right\": 2}}"));
     expect("region of several values", "one value for each name",

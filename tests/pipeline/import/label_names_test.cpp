@@ -205,6 +205,29 @@ TEST_F(LabelNames, SegmentsCountWhateverTheirNumbers) {
     }
 }
 
+// Blanks between cells and within names: the whole name counts, and its side.
+TEST_F(LabelNames, BlanksWithinNamesBelongToThem) {
+    const std::string path = map(kTotal);
+    for (const auto& [name, text] :
+         {std::pair<const char*, const char*>{
+              "colours.ctbl",
+              "# Color table\n0 Nothing 0 0 0 0\n2 kidney right 1 2 3 255\n"
+              "3 kidney left 1 2 4 255\n5 liver 1 2 5 255\n"},
+          {"tabs.tsv", "2\tkidney right\n3\tkidney left\n5\tliver\n"},
+          {"heading.txt", "value name\n2 kidney right\n3 kidney left\n5 liver\n"},
+          {"commas.csv", "sep=,\nvalue,name\n2,kidney, right\n3,kidney, left\n5,liver\n5,liver\n"},
+          {"list.json",
+           "[{\"id\":2,\"name\":\"kidney right\"},{\"id\":3,\"name\":\"kidney left\"},"
+           "{\"id\":5,\"name\":\"liver\"}]"}}) {
+        ImportOptions options;
+        options.table = folder.write(name, text);
+        const auto imported = import_label_map(path, options);
+        EXPECT_EQ(names_of(imported)[2], "kidney right") << name;
+        EXPECT_EQ(names_of(imported)[3], "kidney left") << name;
+        EXPECT_EQ(names_of(imported)[5], "liver") << name;
+    }
+}
+
 // -1 or 255 for the outside, or a name for it: only 0 is outside here.
 TEST_F(LabelNames, BackgroundOfItsOwnNumberIsTheOutside) {
     std::map<Organ, int> values = kTotal;
