@@ -131,7 +131,7 @@ Result<Header> parse_header(const std::string& bytes, const std::string& path) {
     // Some programs end lines with a carriage return alone.
     const std::size_t first_end = bytes.find_first_of("\r\n");
     const bool returns =
-        first_end + 1 < bytes.size() && bytes[first_end] == '\r' && bytes[first_end + 1] != '\n';
+        first_end < bytes.size() - 1 && bytes[first_end] == '\r' && bytes[first_end + 1] != '\n';
     for (int line_number = 1;; ++line_number) {
         const std::size_t end = bytes.find(returns ? '\r' : '\n', at);
         if (end == std::string::npos) return bad("PLY header is cut off");
