@@ -172,6 +172,7 @@ bool ReplayTracker::poll(double now_s, TrackerReading& reading) {
     reading.time_s = std::min(lap_s + recorded_time_s(static_cast<int>(i)), now_s);
     reading.device_time_s = probe[i].timestamp_s;
     reading.in_mannequin = recording_.in_mannequin;
+    reading.placed = true;
     reading.sensor_count = recording_.needle.empty() ? 1 : 2;
     const double until_s = probe[i].timestamp_s + 5e-7;
     if (back && !recording_.acts.empty()) {
