@@ -56,15 +56,16 @@ struct ToolPoses {
     double probe_age_s = 0, needle_age_s = 0;
 };
 
-// The pose of a sensor as calibrations mean it: relative to the reference where there is one, unless
-// the sensor's own pose is in `mannequin`. Nothing for a sensor that is absent or lost, whose pose
-// is not a number, or whose reference is so or came more than 0.25 s before. Constant time.
+// The pose of a sensor as calibrations mean it: relative to the reference where there is one,
+// unless the sensor's own pose is in `mannequin`. Nothing for a sensor that is absent or lost,
+// whose pose is not a number, or whose reference is so or came more than 0.25 s before. Constant
+// time.
 std::optional<Rigid> sensor_pose(const TrackerReading& reading,
                                  const SensorAssignment& assignment,
                                  int index);
 
-// Applies the reference, sensor_from_tool and world_from_mannequin (with its scale). A sensor that is absent or
-// lost, or whose pose is not a number, yields no tool. Constant time.
+// Applies the reference, sensor_from_tool and world_from_mannequin (with its scale). A sensor that
+// is absent or lost, or whose pose is not a number, yields no tool. Constant time.
 ToolPoses tool_poses(const TrackerReading& reading,
                      const Calibrations& calibrations,
                      const SensorAssignment& assignment);
@@ -107,7 +108,8 @@ class ScanEngine {
 
     // Takes a new reading; the next frame shows it. A tool is lost, in the picture, the recording
     // and the scores, once its own sensor has no pose to be believed (SensorWatch::lost), whatever
-    // the others say, and both are with the reference; so is one at exactly the identity among others, which senders give for none.
+    // the others say, and both are with the reference; so is one at exactly the identity among
+    // others, which senders give for none.
     void observe(const TrackerReading& reading, bool is_device);
     // An act of the exercise's procedure, for the next frame; at most four come into one frame, the
     // rest into those after it. False: dozens of them wait already.

@@ -44,8 +44,8 @@ struct TrackerReading {
     double device_time_s = -1;   // on the device's own clock; negative: it has none
     // The sensors are the tools themselves and `world` is the mannequin: no calibration applies.
     bool in_mannequin = false;
-    // Of a recording: the sensors are the tools at their default indices, whatever the user assigned
-    // to those of a device, and relative to any reference.
+    // Of a recording: the sensors are the tools at their default indices, whatever the user
+    // assigned to those of a device, and relative to any reference.
     bool placed = false;
     // Force on the probe's face, newtons, from a force or pressure sensor; negative: there is none.
     double force_n = -1;

@@ -291,6 +291,16 @@ Message IgtlTracker::what_came(double now_s) const {
     for (std::size_t i = 2; i < heard_.poses.size(); ++i) {
         if (heard_.poses[i] > heard_.poses[most]) most = i;
     }
+    if (most > 0) {
+        const TransformName name = split_transform_name(names_[most]);
+        const std::string turned = std::string(name.to) + "To" + std::string(name.from);
+        if ((name.from == "Tracker" || name.from == "Reference") &&
+            (rank_as_tool(turned, ToolRole::probe) > 0 ||
+             rank_as_tool(turned, ToolRole::needle) > 0))
+            return {
+                "{} is the inverse of a tool's pose; send the tool's own, such as ProbeToTracker.",
+                {names_[most]}};
+    }
     if (most > 0)
         return {
             "{} transforms {} came, none of a probe; send ProbeTo..., TransducerTo... or "

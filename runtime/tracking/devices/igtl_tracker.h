@@ -35,8 +35,9 @@ struct IgtlTrackerOptions {
 
 // A device's name says which tool it is, as in recordings (formats/recording/tool_frames.h); others
 // take the next free sensors in order. The pose of a name that ends in ToMannequin is that of the
-// tool in `mannequin`. A transform for the role `reference` is the sensor kReferenceSensor. A SENSOR message of device ProbeForce gives the newtons on the probe's face, which come with
-// the next pose.
+// tool in `mannequin`. A transform for the role `reference` is the sensor kReferenceSensor. A
+// SENSOR message of device ProbeForce gives the newtons on the probe's face, which come with the
+// next pose.
 //
 // A listening tracker hears one program at a time: a second one is refused while the first sends,
 // and health() says so.

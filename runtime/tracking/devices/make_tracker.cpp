@@ -113,19 +113,16 @@ constexpr auto kRequired = TrackerKind::Argument::required;
 constexpr bool kStepped = true, kNotStepped = false;
 
 constexpr TrackerKind kTrackers[] = {
-    {"mouse", "mouse", kNone, "Mouse and keyboard", "mouse", kStepped, false, make_mouse},
-    {"sweep", "sweep:NAME", kOptional, nullptr, nullptr, kStepped, false, make_sweep},
-    {"replay", "replay:FILE[,NEEDLE_FILE]", kRequired, nullptr, nullptr, kNotStepped, false,
-     make_replay},
+    {"mouse", "mouse", kNone, "Mouse and keyboard", "mouse", kStepped, make_mouse},
+    {"sweep", "sweep:NAME", kOptional, nullptr, nullptr, kStepped, make_sweep},
+    {"replay", "replay:FILE[,NEEDLE_FILE]", kRequired, nullptr, nullptr, kNotStepped, make_replay},
     {"igtl", "igtl:HOST:PORT | igtl:listen:PORT", kRequired, "OpenIGTLink, this machine",
-     "igtl:127.0.0.1:18944", kNotStepped, true, make_igtl},
-    {"viper", "viper", kNone, "Polhemus Viper", "viper", kStepped, false,
-     make_usb<make_viper_driver>},
-    {"3dg", "3dg", kNone, "NDI 3D Guidance", "3dg", kStepped, false,
-     make_usb<make_guidance_driver>},
-    {"liberty", "liberty", kNone, "Polhemus Liberty / Patriot", "liberty", kStepped, false,
+     "igtl:127.0.0.1:18944", kNotStepped, make_igtl, true},
+    {"viper", "viper", kNone, "Polhemus Viper", "viper", kStepped, make_usb<make_viper_driver>},
+    {"3dg", "3dg", kNone, "NDI 3D Guidance", "3dg", kStepped, make_usb<make_guidance_driver>},
+    {"liberty", "liberty", kNone, "Polhemus Liberty / Patriot", "liberty", kStepped,
      make_usb<make_liberty_driver>},
-    {"null", "null", kNone, "None", "null", kNotStepped, false, make_null},
+    {"null", "null", kNone, "None", "null", kNotStepped, make_null},
 };
 
 }  // namespace

@@ -46,10 +46,11 @@ struct TrackerKind {
     const char* name;
     const char* panel_spec;
     bool stepped_through;  // by F7, which chooses `prefix`
-    bool names_sensors;    // as it hears them, and puts those with a role in their places
     // argument: what follows the colon
     Result<std::unique_ptr<Tracker>> (*make)(const std::string& argument,
                                              const TrackerContext& context);
+    // Knows its sensors by the names it hears, and puts those with a role in their places.
+    bool names_sensors = false;
 };
 
 // Every kind, in the order of the help.

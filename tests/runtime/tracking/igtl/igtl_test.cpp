@@ -171,6 +171,7 @@ TEST(IgtlTracker, SaysWhyNoPoseComes) {
         {igtl::encode_transform("ImageToReference", 1, scaled), "ImageToReference has a scale"},
         {igtl::encode_transform("ProbeToTracker", 1, mirrored), "mirrored"},
         {igtl::encode_transform("MarkerToReference", 1, {}), "--tool probe=MarkerToReference"},
+        {igtl::encode_transform("TrackerToProbe", 1, {}), "inverse of a tool's pose"},
         {igtl::encode_transform("ProbeToTracker", 1, metres), "metres"},
         {igtl::encode("STATUS", "S", 1, Bytes(31, 7)), "none with a pose"}};
     for (const auto& [message, sentence] : cases) {
