@@ -420,6 +420,11 @@ class LayoutReader {
             tool.time = times.empty() ? -1 : times[each_time ? k : 0];
             const bool whole = tool.place[0] >= 0 && tool.place[1] >= 0 && tool.place[2] >= 0;
             if (!whole) return missing("tx of tool " + std::to_string(k + 1));
+            for (std::size_t i = 0; i < (one.quaternion ? 4u : 9u); ++i) {
+                if (tool.turn[i] < 0)
+                    return missing(std::string(one.quaternion ? kQuaternion[i] : kMatrix[i]) +
+                                   " of tool " + std::to_string(k + 1));
+            }
             tool.place_unit_mm = unit_mm(tool.place[0]);
             tool.tool = name_before(at, k);
             layout_.tools.push_back(std::move(tool));

@@ -222,7 +222,7 @@ void recordings(Bytes bytes) {
     std::string probe = at < 0 ? "" : sequence.transforms[static_cast<std::size_t>(at)];
     std::string needle =
         needle_at < 0 ? "" : sequence.transforms[static_cast<std::size_t>(needle_at)];
-    why_no_pose(sequence, at);
+    if (at >= 0) why_no_pose(sequence, at);
     check_error(bring_to_one_frame(sequence, probe, needle, "fuzz"));
     for (const SequenceFrame& frame : sequence.frames)
         demand(frame.poses.size() == sequence.transforms.size());
