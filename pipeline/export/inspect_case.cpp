@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <set>
+#include <span>
 
 #include <nlohmann/json.hpp>
 
@@ -84,6 +85,33 @@ std::string budget_text(const ErrorBudget& budget, const NextStep& next) {
         text +=
             line("  next: %s, from %.2f to %.2f mm on the synthetic bodies for %.0f s more",
                  next.settings.c_str(), next.error_from_mm, next.error_to_mm, next.more_seconds);
+    return text;
+}
+
+// The structures whose place on the mannequin is known least, by the report of the fit.
+std::string unknown_text(std::span<const StageReport> stages) {
+    const MeasureGroup *open = nullptr, *held = nullptr;
+    for (const StageReport& report : stages) {
+        if (report.stage != stage_names::kWarp) continue;
+        for (const MeasureGroup& group : report.groups) {
+            if (group.name == "unknown_p90_mm") open = &group;
+            if (group.name == "unknown_p90_with_two_landmarks_mm") held = &group;
+        }
+    }
+    if (open == nullptr || open->values.empty()) return "";
+    std::vector<Measure> worst = open->values;
+    std::stable_sort(worst.begin(), worst.end(),
+                     [](const Measure& a, const Measure& b) { return a.value > b.value; });
+    std::string text = "\nplace of the structures, as far as the readings tell: within (90 %)\n";
+    for (std::size_t n = 0; n < std::min<std::size_t>(5, worst.size()); ++n) {
+        std::string with;
+        for (const Measure& m : held == nullptr ? std::vector<Measure>{} : held->values) {
+            if (m.name == worst[n].name && m.value < worst[n].value)
+                with = line("; two landmarks would bring it to %.1f mm", m.value);
+        }
+        while (!with.empty() && with.back() == '\n') with.pop_back();
+        text += line("  %-24s %6.1f mm%s", worst[n].name.c_str(), worst[n].value, with.c_str());
+    }
     return text;
 }
 
@@ -344,6 +372,7 @@ std::string inspection_text(const CaseBundle& bundle, const Inspection& inspecti
     else
         text += "  (seconds stand in BUNDLE.report.json, which is not beside this bundle)\n";
     text += budget_text(error_budget(bundle.manifest.stages), inspection.next);
+    text += unknown_text(bundle.manifest.stages);
     text += "\nexercises\n";
     for (const EmbeddedExercise& embedded : bundle.exercises) {
         const auto exercise = parse_exercise(embedded.toml, embedded.name);

@@ -26,7 +26,8 @@ struct PoseChoice {
     bool open_side_dropped = false;    // the sweep is of a flank: the open side was not considered
     double mirror_score_mm = 0;        // of the mirrored surface
     double turned_score_mm = 0;        // of the best pose with the head away from `up`; 0: no `up`
-    std::string handedness;            // whether the skin tells right-handed axes from left-handed
+    std::string head;  // whether the skin tells the given `up` from its opposite; empty: no `up`
+    std::string handedness;  // whether the skin tells right-handed axes from left-handed
     std::vector<std::string> warnings;
 };
 
