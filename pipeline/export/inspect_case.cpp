@@ -62,8 +62,8 @@ Json budget_json(const ErrorBudget& budget, const NextStep& next) {
     }
     json["known_mm"] = budget.known_mm;
     json["next"] = nullptr;
-    if (!next.settings.empty())
-        json["next"] = {{"settings", next.settings},
+    if (!next.step.empty())
+        json["next"] = {{"step", next.step},
                         {"error_from_mm", next.error_from_mm},
                         {"error_to_mm", next.error_to_mm},
                         {"more_seconds", next.more_seconds}};
@@ -73,46 +73,48 @@ Json budget_json(const ErrorBudget& budget, const NextStep& next) {
 std::string budget_text(const ErrorBudget& budget, const NextStep& next) {
     std::string text = "\nerror budget, mean displacement of surfaces\n";
     for (const BudgetEntry& e : budget.entries) {
-        char mm[16] = "     ?";
-        if (std::isfinite(e.mm)) std::snprintf(mm, sizeof mm, "%6.2f", e.mm);
-        text +=
-            line("  %-10s %s mm  %s (%s)", e.stage.c_str(), mm, e.cause.c_str(), e.basis.c_str());
+        if (std::isfinite(e.mm))
+            text += line("  %-10s %6.2f mm  %s (%s)", e.stage.c_str(), e.mm, e.cause.c_str(),
+                         e.basis.c_str());
+        else
+            text += line("  %-10s not known  %s: %s", e.stage.c_str(), e.cause.c_str(),
+                         e.basis.c_str());
     }
     text += line("  %-10s %6.2f mm", "known", budget.known_mm);
-    if (next.settings.empty())
-        text += "  no setting that was measured does better\n";
+    if (next.step.empty())
+        text += "  nothing measured lowers it by a hundredth\n";
+    else if (next.more_seconds > 0)
+        text += line("  next: %s, from %.2f to %.2f mm for %.2g s more", next.step.c_str(),
+                     next.error_from_mm, next.error_to_mm, next.more_seconds);
     else
-        text +=
-            line("  next: %s, from %.2f to %.2f mm on the synthetic bodies for %.0f s more",
-                 next.settings.c_str(), next.error_from_mm, next.error_to_mm, next.more_seconds);
+        text += line("  next: %s, from %.2f to %.2f mm", next.step.c_str(), next.error_from_mm,
+                     next.error_to_mm);
     return text;
 }
 
-// The structures whose place on the mannequin is known least, by the report of the fit.
+// The structures whose place on the mannequin is known least.
 std::string unknown_text(std::span<const StageReport> stages) {
-    const MeasureGroup *open = nullptr, *held = nullptr;
-    for (const StageReport& report : stages) {
-        if (report.stage != stage_names::kWarp) continue;
-        for (const MeasureGroup& group : report.groups) {
-            if (group.name == "unknown_p90_mm") open = &group;
-            if (group.name == "unknown_p90_with_two_landmarks_mm") held = &group;
-        }
-    }
-    if (open == nullptr || open->values.empty()) return "";
-    std::vector<Measure> worst = open->values;
-    std::stable_sort(worst.begin(), worst.end(),
-                     [](const Measure& a, const Measure& b) { return a.value > b.value; });
-    std::string text = "\nplace of the structures, as far as the readings tell: within (90 %)\n";
-    for (std::size_t n = 0; n < std::min<std::size_t>(5, worst.size()); ++n) {
-        std::string with;
-        for (const Measure& m : held == nullptr ? std::vector<Measure>{} : held->values) {
-            if (m.name == worst[n].name && m.value < worst[n].value)
-                with = line("; two landmarks would bring it to %.1f mm", m.value);
-        }
-        while (!with.empty() && with.back() == '\n') with.pop_back();
-        text += line("  %-24s %6.1f mm%s", worst[n].name.c_str(), worst[n].value, with.c_str());
-    }
+    const std::vector<UnknownPlace> places = unknown_places(stages);
+    if (places.empty()) return "";
+    std::string text =
+        "\nplace of the structures, as far as the readings tell: nine times in ten within\n";
+    for (std::size_t n = 0; n < std::min<std::size_t>(5, places.size()); ++n)
+        text += line("  %-32s %6.1f mm", places[n].label.c_str(), places[n].p90_mm);
+    if (places.size() > 5)
+        text += line("  the other %zu within %.1f mm", places.size() - 5, places[5].p90_mm);
+    if (const std::string advice = landmark_advice(places); !advice.empty())
+        text += "  " + advice + "\n";
     return text;
+}
+
+Json unknown_json(std::span<const StageReport> stages) {
+    Json json = Json::array();
+    for (const UnknownPlace& place : unknown_places(stages)) {
+        Json entry{{"label", place.label}, {"p90_mm", place.p90_mm}};
+        if (place.with_landmarks_mm > 0) entry["with_two_landmarks_mm"] = place.with_landmarks_mm;
+        json.push_back(std::move(entry));
+    }
+    return json;
 }
 
 // The mechanics of a label, not of its tissue, which veins and arteries may share.
@@ -285,6 +287,7 @@ std::string inspection_json(const CaseBundle& bundle, const Inspection& inspecti
     for (std::size_t i = 0; i < bundle.manifest.stages.size(); ++i)
         json["stages"].push_back(stage_json(bundle.manifest.stages[i], inspection.seconds[i]));
     json["error_budget"] = budget_json(error_budget(bundle.manifest.stages), inspection.next);
+    json["unknown"] = unknown_json(bundle.manifest.stages);
     json["exercises"] = Json::array();
     for (const EmbeddedExercise& embedded : bundle.exercises) {
         Json exercise{{"name", embedded.name}};

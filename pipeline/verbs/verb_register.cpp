@@ -310,6 +310,7 @@ void print_fit(const RegisterResult& result) {
     for (const Note& note : result.report.notes) {
         if (note.name == "head") std::printf("head and feet: %s\n", note.text.c_str());
         if (note.name == "handedness") std::printf("right and left: %s\n", note.text.c_str());
+        if (note.name == "front") std::printf("front and back: %s\n", note.text.c_str());
     }
 }
 
