@@ -322,11 +322,14 @@ void find_unknown(const FitContext& s,
         const double displaced = displaced_mm(s, w->registration, place.points);
         OrganUnknown unknown;
         unknown.label = place.label;
+        unknown.beyond_rigid_mm = beyond;
         unknown.covariance =
             with_model(spread_of_draws(place, judged, w->trust, displaced), beyond);
-        if (!others.empty())
-            unknown.refits =
-                with_model(spread_of_refits(s, place, w->registration, others), beyond);
+        if (!others.empty()) {
+            const Spread halves = spread_of_refits(s, place, w->registration, others);
+            unknown.halves_p90_mm = halves.p90_mm;
+            unknown.refits = with_model(halves, beyond);
+        }
         const Spread &a = unknown.covariance, &b = unknown.refits;
         unknown.median_mm = std::max(a.median_mm, b.median_mm);
         unknown.p90_mm = std::max(a.p90_mm, b.p90_mm);

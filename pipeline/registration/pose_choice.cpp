@@ -19,8 +19,9 @@ constexpr double kCloseScore = 1.10, kQuarterTurn = 1.25;
 // Bodies whose skin has no right and left fit their mirror image within 3 % either way; those whose
 // skin has fit it 15 % worse or more.
 constexpr double kMirrorScore = 1.06;
-// Torsos without a waist fit upside down 3 % better to 3 % worse: neither is told then.
-constexpr double kHeadTurnedScore = 1.03, kHeadRightScore = 1.06;
+// Torsos without a waist, read all round, fit upside down 5 % better to 5 % worse: neither is told
+// then. Where half of the skin or more was not read they fit up to 14 % better.
+constexpr double kOppositeScore = 1.06, kOppositeScoreOfPart = 1.2, kWholeCoverage = 0.65;
 constexpr int kFewerStarts = 3;   // the head the other way is looked for with a third of the starts
 constexpr int kMoreSearches = 2;  // with twice the starts each, while only one start found the best
 
@@ -100,6 +101,8 @@ JudgedPose judge(const FitContext& s,
         hints += given.hints.up_weight_mm2 * dot(r, r);
     }
     judged.score_mm = std::sqrt(gaps + 0.5 * deformation + fit.energy_mm2 + hints);
+    judged.skin_coverage = static_cast<double>(matches.from_skin.size()) /
+                           static_cast<double>(std::max<std::size_t>(1, matches.skin_queries));
     judged.coverage = static_cast<double>(matches.from_target.size()) /
                       static_cast<double>(std::max<std::size_t>(1, matches.target_queries));
     return judged;
@@ -234,6 +237,15 @@ Given mirrored(Given given, const Mirror& mirror) {
     return given;
 }
 
+// What the scores of a pose and of its opposite tell.
+enum class Verdict { right, wrong, untold };
+Verdict verdict_of(const JudgedPose& best, double opposite_mm) {
+    const double margin =
+        best.skin_coverage < kWholeCoverage ? kOppositeScoreOfPart : kOppositeScore;
+    if (opposite_mm * margin < best.score_mm) return Verdict::wrong;
+    return opposite_mm > margin * best.score_mm ? Verdict::right : Verdict::untold;
+}
+
 // Left-handed axes: the surface is then a mirror image of the body, which a landmark off the
 // midline shows, or the skin where its right and left differ. Most torsos' hardly do.
 void check_hands(const FitContext& s,
@@ -296,18 +308,62 @@ void check_head(const FitContext& s,
     const double best = choice->best.score_mm;
     const std::string scores =
         text("it fits to %.2f mm the other way and to %.2f mm as given", score, best);
-    if (score * kHeadTurnedScore < best) {
+    const Verdict verdict = verdict_of(choice->best, score);
+    if (verdict == Verdict::wrong) {
         choice->head = "wrong: " + scores;
         choice->warnings.push_back(text(
             "the head direction seems to point to the feet: the skin fits to %.2f mm the other "
             "way and to %.2f mm as given; turn its sign (--up), or give two landmarks such as "
             "crotch and navel if it is right (--landmarks FILE.csv)",
             score, best));
-    } else if (score < kHeadRightScore * best && given.landmarks.size() < 2) {
+    } else if (verdict == Verdict::untold && given.landmarks.size() < 2) {
         choice->head = "not told by the skin: " + scores +
                        "; two landmarks such as crotch and navel would tell (--landmarks FILE.csv)";
     } else {
         choice->head = "right: " + scores;
+    }
+}
+
+// The patient the other way round, front to back, about the middle of the readings.
+void check_front(const FitContext& s,
+                 const Given& given,
+                 const SplinePenalty& field,
+                 const RigidOptions& options,
+                 PoseChoice* choice) {
+    const JudgedPose& best = choice->best;
+    Given turned = given;
+    if (given.hints.back) turned.hints.back = -*given.hints.back;
+    RigidOptions rigid = options;
+    rigid.hints = turned.hints;
+    Vector3 middle;
+    for (Point3 p : s.target.points)
+        middle = middle + (p - Point3{}) / static_cast<double>(s.target.points.size());
+    const Matrix3& turn = best.rigid.target_from_skin.rotation;
+    const Matrix3 half = Matrix3::from_columns(-turn.column(0), -turn.column(1), turn.column(2));
+    // x -> middle + half (turn^T (x - middle)) after the pose.
+    const Vector3 from = best.rigid.target_from_skin.translation - middle;
+    const Rigid start{half, middle + half * (transpose(turn) * from)};
+    const double score =
+        judge(s, s.target, turned, field, refine_rigid(s.coarse, s.target, start, rigid)).score_mm;
+    choice->front_turned_score_mm = score;
+    const double here = best.score_mm;
+    const std::string scores =
+        text("it fits to %.2f mm turned front to back and to %.2f mm as it lies", score, here);
+    const Verdict verdict = verdict_of(best, score);
+    if (given.hints.back && verdict == Verdict::wrong) {
+        choice->front = "wrong: " + scores;
+        choice->warnings.push_back(
+            "the patient seems to lie the other way round, front to back: " + scores +
+            "; check the open side (--open-side), or give a landmark on the front and one on the "
+            "back (--landmarks FILE.csv)");
+    } else if (verdict != Verdict::right && given.landmarks.size() < 2) {
+        choice->front = std::string(given.hints.back ? "told by the open side, not by the skin: "
+                                                     : "not told by the skin: ") +
+                        scores +
+                        "; a landmark on the front and one on the back would tell (--landmarks "
+                        "FILE.csv)";
+    } else {
+        choice->front = "right: " + scores;
     }
 }
 
@@ -341,6 +397,7 @@ PoseChoice choose_pose(const FitContext& s,
     rigid.starts = options.rigid.starts;
     check_head(s, given, field, rigid, progress, &choice);
     check_hands(s, given, field, rigid, judged, &choice);
+    check_front(s, given, field, rigid, &choice);
     return choice;
 }
 
