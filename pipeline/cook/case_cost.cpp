@@ -65,6 +65,9 @@ CaseSize case_size(const Recipe& recipe) {
         const auto voxels = static_cast<double>(grid.voxel_count());
         size.label_voxels = voxels / 1e6;
         size.interpolated_nodes = nodes_between_slices(grid.spacing_mm, voxels);
+    } else if (is_mesh_source(recipe.resolve(recipe.inputs.labels))) {
+        if (const auto grid = mesh_inputs_grid(recipe))
+            size.label_voxels = size.mesh_voxels = static_cast<double>(grid->voxel_count()) / 1e6;
     } else {
         const VolumeSize labels = size_in_headers(recipe.resolve(recipe.inputs.labels));
         size.label_mb = static_cast<double>(labels.bytes) / 1e6;

@@ -216,15 +216,32 @@ bool is_mesh_source(const std::string& path) {
     return !mesh_files(path).empty();
 }
 
-Result<MeshBody> read_meshes(const std::string& path,
-                             const std::string& table_path,
-                             const MeshOptions& options,
-                             const Progress& progress) {
+namespace {
+
+Result<NodeTable> table_of(const std::string& path, const std::string& table_path) {
     if (table_path.empty())
         return Error{"meshes without a table of their nodes", path,
                      "give --table NODES.csv: rows of node,label,role"};
     SONOCASE_TRY(auto csv, read_text_file(table_path));
-    SONOCASE_TRY(auto table, parse_node_table(csv, table_path));
+    return parse_node_table(csv, table_path);
+}
+
+}  // namespace
+
+Result<Grid> mesh_grid(const std::string& path,
+                       const std::string& table_path,
+                       const MeshOptions& options) {
+    SONOCASE_TRY(const auto table, table_of(path, table_path));
+    Collector collector(table, options);
+    for (const std::string& file : mesh_files(path)) SONOCASE_TRY_DONE(collector.add_file(file));
+    return grid_of(collector.organs(), options, path);
+}
+
+Result<MeshBody> read_meshes(const std::string& path,
+                             const std::string& table_path,
+                             const MeshOptions& options,
+                             const Progress& progress) {
+    SONOCASE_TRY(const auto table, table_of(path, table_path));
     Collector collector(table, options);
     for (const std::string& file : mesh_files(path)) SONOCASE_TRY_DONE(collector.add_file(file));
     if (!collector.unmapped().empty()) {
