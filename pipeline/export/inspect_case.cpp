@@ -97,7 +97,8 @@ std::string unknown_text(std::span<const StageReport> stages) {
     const std::vector<UnknownPlace> places = unknown_places(stages);
     if (places.empty()) return "";
     std::string text =
-        "\nplace of the structures, as far as the readings tell: nine times in ten within\n";
+        "\nplace of the structures, by what the readings leave open if the patient lies as fitted: "
+        "nine times in ten within\n";
     for (std::size_t n = 0; n < std::min<std::size_t>(5, places.size()); ++n)
         text += line("  %-32s %6.1f mm", places[n].label.c_str(), places[n].p90_mm);
     if (places.size() > 5)

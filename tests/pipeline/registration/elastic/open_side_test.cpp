@@ -209,7 +209,7 @@ TEST_P(SignsAndHands, AreNamedWhereTheyAreWrongAndNotWhereTheyAreRight) {
     for (const RegisterResult* r : {&right, &off}) {
         EXPECT_FALSE(warns(*r, "seems to point to the feet"));
         EXPECT_FALSE(warns(*r, "mirror image"));
-        EXPECT_FALSE(warns(*r, "front to back"));
+        EXPECT_FALSE(warns(*r, "seems to lie the other way round"));
     }
     const RegisterResult turned = aligned("turned", -head, false),
                          left = aligned("left-handed", head, true);
