@@ -269,8 +269,8 @@ namespace {
 // A skin that differs says that the whole body does, or that its fat does: organs that follow the
 // skin and organs that stay where a rigid motion puts them are as likely. What the map does beyond
 // a rigid motion is therefore left open, beside the spread of a model that is taken for true. The
-// factors are those with which sixty known maps, half of them no quadratic, hold their errors
-// (tests/pipeline/registration/fit_unknown_test.cpp).
+// factors lie above those that halves of sixty known maps ask for (1.3 to 1.7), since maps of other
+// builds ask for more (tests/pipeline/registration/fit_unknown_test.cpp, docs/numerics.md).
 constexpr double kP90Factor = 1.8, kP95Factor = 2.4, kMedianOfModel = 0.5;
 
 Spread with_model(const Spread& fit, double beyond_rigid_mm) {
