@@ -167,8 +167,9 @@ struct CaseSize {
 
 // Cores that a stage's job asks a build farm for, and its peak memory in MB: base + a * MB of the
 // label file + b * million voxels of the label map (+ b' where meshes become it) + c * million
-// cooked voxels + d * million voxels of the region; for a stage that works through large maps piece by piece, the voxels count at most
-// large_mb + e * million voxels. docs/farm.md has the measurements.
+// cooked voxels + d * million voxels of the region; for a stage that works through large maps piece
+// by piece, the voxels count at most large_mb + e * million voxels. docs/farm.md has the
+// measurements.
 struct StageCost {
     int threads = 1;
     double base_mb = 240, per_label_mb = 0, per_label_voxel = 0, per_cooked_voxel = 0;

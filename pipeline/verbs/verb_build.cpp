@@ -294,8 +294,8 @@ Status write_case(const BuildOptions& options,
     return Done{};
 }
 
-// A cache for this run alone where none was given: what is made to choose settings, or for the first
-// of several mannequins, is not made twice.
+// A cache for this run alone where none was given: what is made to choose settings, or for the
+// first of several mannequins, is not made twice.
 Status open_own_cache(BuildOptions& options, const std::string& out) {
     if (!options.cache.empty()) return Done{};
     options.cache = out + ".cache-" + std::to_string(getpid());

@@ -284,8 +284,8 @@ double apart_mm(const LabelVolume& labels, const Registration& a, const Registra
     return off[off.size() * 95 / 100];
 }
 
-// What a case teaches must not depend on chance: on a seed, or on where the search begins. One other
-// seed with other starts; with SONOCASE_SEEDS=20 seeds 2 to 20.
+// What a case teaches must not depend on chance: on a seed, or on where the search begins. One
+// other seed with other starts; with SONOCASE_SEEDS=20 seeds 2 to 20.
 class AnySeed : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(AnySeed, GivesTheSameMap) {
