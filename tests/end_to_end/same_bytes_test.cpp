@@ -29,7 +29,7 @@ using sonocase::testing::run_command;
 // bright. Paper frames: of these bundles and of scripts that keep clear of ribs.
 constexpr const char* kDraft = "b48247ac2ef0a13c1566571d6def11a8";
 constexpr const char* kBalanced = "8e12363531170797d73b6740d57f415d";
-constexpr const char* kSlender = "a37d2566532f9f8bb2c22b8911936f26";
+constexpr const char* kSlender = "7df1760ecd7dca9fbf1c09ada92093af";
 constexpr const char* kReal = "1e286110ef6a985496a9c4efa77a28b6";
 constexpr const char* kDraftPhysical = "04c513a0c724f5b01a7f9aee8143b092";
 constexpr const char* kDraftPaper = "f39d1b64d8ba65288724451ca242d680";
