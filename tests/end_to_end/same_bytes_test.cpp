@@ -30,11 +30,11 @@ using sonocase::testing::run_command;
 constexpr const char* kDraft = "b48247ac2ef0a13c1566571d6def11a8";
 constexpr const char* kBalanced = "8e12363531170797d73b6740d57f415d";
 constexpr const char* kSlender = "7df1760ecd7dca9fbf1c09ada92093af";
-constexpr const char* kReal = "1e286110ef6a985496a9c4efa77a28b6";
+constexpr const char* kReal = "8f0feaf39ec085ca663f88537ef636c3";
 constexpr const char* kDraftPhysical = "04c513a0c724f5b01a7f9aee8143b092";
 constexpr const char* kDraftPaper = "f39d1b64d8ba65288724451ca242d680";
-constexpr const char* kRealPhysical = "5d4803c85e13541b869f72a19c65049e";
-constexpr const char* kRealPaper = "9d091264755ea3c9784d9df979e66233";
+constexpr const char* kRealPhysical = "f8fc80677ddf53459ba50953df33d60e";
+constexpr const char* kRealPaper = "238bbc50256594eac66fdcb76d826e84";
 
 class SameBytes : public ::testing::Test {
   protected:
