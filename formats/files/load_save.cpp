@@ -203,6 +203,7 @@ Result<Sequence> load_one_recording(const std::string& path) {
         const bool ours = std::any_of(read.fields.begin(), read.fields.end(),
                                       [](const auto& f) { return f.name == "SonocaseSession"; });
         if (ours) return read;
+        add_inverses(read);
         if (const std::size_t lost = mark_lost(read); lost > 0)
             read.notes.push_back(
                 {"{} poses that are the identity, or repeat the last while another tool moves, "

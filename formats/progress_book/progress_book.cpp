@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <map>
+#include <string_view>
 
 #include "formats/exercise/metric_table.h"
 #include "formats/text/number_text.h"
@@ -60,7 +61,11 @@ class Statement {
     sqlite3_stmt* raw_ = nullptr;
 };
 
-std::string csv_cell(const std::string& text) {
+// A name that a spreadsheet would run as a formula gets an apostrophe, which it takes for text.
+std::string csv_cell(const std::string& given) {
+    const bool formula =
+        !given.empty() && std::string_view("=+-@\t").find(given[0]) != std::string_view::npos;
+    const std::string text = formula ? "'" + given : given;
     if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
     std::string out = "\"";
     for (const char c : text) {
@@ -76,9 +81,16 @@ struct ProgressBook::Impl {
     sqlite3* db = nullptr;
     std::string path;
     ~Impl() { sqlite3_close(db); }
+    bool busy() const {
+        const int code = sqlite3_errcode(db) & 0xff;
+        return code == SQLITE_BUSY || code == SQLITE_LOCKED;
+    }
     Error fault(const char* doing) const {
-        return {std::string(doing) + ": " + sqlite3_errmsg(db), path,
-                "earlier sessions are unchanged"};
+        // SQLite says the same of a lock that is held and of one that cannot be had.
+        const std::string why = busy() ? "another program has it, or its folder cannot lock files "
+                                         "(a network home)"
+                                       : sqlite3_errmsg(db);
+        return {std::string(doing) + ": " + why, path, "earlier sessions are unchanged"};
     }
     bool run(const char* sql) {
         return sqlite3_exec(db, sql, nullptr, nullptr, nullptr) == SQLITE_OK;
@@ -111,6 +123,7 @@ Result<ProgressBook> ProgressBook::open(const std::string& path) {
         return impl->fault("cannot open");
     }
     const std::int64_t application = impl->pragma("PRAGMA application_id");
+    if (impl->busy()) return impl->fault("cannot open");
     const std::int64_t version = impl->pragma("PRAGMA user_version");
     const std::int64_t tables = impl->pragma("SELECT count(*) FROM sqlite_master");
     if (tables < 0) return impl->fault("is not a progress book");
@@ -249,7 +262,7 @@ Status ProgressBook::remove_trainee(const std::string& trainee,
         const std::size_t ending = pictures.rfind(".igs.mha");
         if (ending != std::string::npos)
             pictures.replace(ending, std::string::npos, ".frames.igs.mha");
-        for (const std::string& file : {e.recording, pictures}) {
+        for (const std::string& file : {e.recording, pictures, e.recording + ".scores.json"}) {
             std::error_code failed;
             std::filesystem::remove(file, failed);
             if (failed && not_deleted) not_deleted->push_back(file);

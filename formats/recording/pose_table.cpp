@@ -251,6 +251,7 @@ class LayoutReader {
                    m = !cm &&
                        (name.ends_with("x_m") || name.ends_with("y_m") || name.ends_with("z_m")) &&
                        cut("_m");
+        name = of_matrix(name);
         for (const auto& [given, meant] : kOtherNames) {
             if (name != given) continue;
             name = meant;
@@ -262,6 +263,28 @@ class LayoutReader {
             layout_.time_unit_s = ms ? 1e-3 : us ? 1e-6 : ns ? 1e-9 : 1;
         }
         columns_.push_back({std::move(name), index, cm ? 10.0 : m ? 1000.0 : 1.0});
+    }
+
+    // An entry of a matrix by its row and column: t14 of t11 to t44, t03 of t00 to t33,
+    // rotation[0][2].
+    std::string of_matrix(const std::string& name) const {
+        static constexpr std::string_view kBefore[] = {"rotation_", "rot_", "matrix_", "r_", "m_"};
+        std::size_t at = std::string::npos;
+        int from = 0;
+        for (const std::string_view before : kBefore) {
+            if (name.size() == before.size() + 3 && name.starts_with(before) &&
+                name[before.size() + 1] == '_')
+                at = before.size();
+        }
+        if (name.size() == 3 && name[0] == 't') {
+            at = 1;
+            from = lower(line_).find("t00") == std::string::npos ? 1 : 0;
+        }
+        if (at == std::string::npos) return name;
+        const int row = name[at] - '0' - from, column = name.back() - '0' - from;
+        if (row < 0 || row > 2 || column < 0 || column > 3) return name;
+        return column < 3 ? kMatrix[static_cast<std::size_t>(3 * row + column)]
+                          : kPlaces[static_cast<std::size_t>(row)];
     }
 
     int first(std::string_view name) const {
@@ -397,6 +420,11 @@ class LayoutReader {
             tool.time = times.empty() ? -1 : times[each_time ? k : 0];
             const bool whole = tool.place[0] >= 0 && tool.place[1] >= 0 && tool.place[2] >= 0;
             if (!whole) return missing("tx of tool " + std::to_string(k + 1));
+            for (std::size_t i = 0; i < (one.quaternion ? 4u : 9u); ++i) {
+                if (tool.turn[i] < 0)
+                    return missing(std::string(one.quaternion ? kQuaternion[i] : kMatrix[i]) +
+                                   " of tool " + std::to_string(k + 1));
+            }
             tool.place_unit_mm = unit_mm(tool.place[0]);
             tool.tool = name_before(at, k);
             layout_.tools.push_back(std::move(tool));
@@ -551,8 +579,13 @@ Status check_unit(const std::vector<Pose>& poses, const std::string& where) {
     const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
     std::nth_element(steps.begin(), middle, steps.end());
     if (!(*middle > 3)) return Done{};
+    // No tracker is slower than 2 Hz or faster than 2 kHz.
+    const auto [unit, name] = *middle >= 5e5   ? std::pair{"nanoseconds", "time_ns"}
+                              : *middle >= 500 ? std::pair{"microseconds", "time_us"}
+                                               : std::pair{"milliseconds", "time_ms"};
     return Error{"times rise by " + number_text(*middle, 4) + " from row to row", where,
-                 "are they milliseconds? Name their column time_ms; or timestamp_s for seconds"};
+                 std::string("are they ") + unit + "? Name their column " + name +
+                     "; or timestamp_s for seconds"};
 }
 
 // Takes the next line off `text`.

@@ -546,6 +546,7 @@ Status Reader::read_frames() {
     }
     out_.frames.resize(frame_count);
     seen_.assign(frame_count, false);
+    std::size_t beyond = 0;
     HeaderLines lines(header_.bytes, header_.nrrd);
     for (HeaderLine line; lines.next(line) == HeaderLines::Next::line;) {
         if (!is_frame_key(line.key)) continue;
@@ -556,11 +557,17 @@ Status Reader::read_frames() {
             return fault("'" + std::string(line.key.substr(0, 40)) + "' does not name a frame",
                          "expected Seq_Frame0000_Timestamp or the like", line.number);
         }
-        if (static_cast<std::size_t>(index) >= frame_count) continue;  // cut off while it grew
+        if (static_cast<std::size_t>(index) >= frame_count) {  // cut off while it grew
+            beyond = std::max(beyond, static_cast<std::size_t>(index) + 1 - frame_count);
+            continue;
+        }
         const auto i = static_cast<std::size_t>(index);
         seen_[i] = true;
         SONOCASE_TRY_DONE(read_frame_field(line, i, line.key.substr(underscore + 1)));
     }
+    if (beyond > 0)
+        out_.notes.push_back({"{} frames beyond the {} that the header states are left out.",
+                              {std::to_string(beyond), std::to_string(frame_count)}});
     for (std::size_t i = 0; i < frame_count; ++i) {
         if (!seen_[i])
             return fault("frame " + std::to_string(i) + " has no fields", "make the file again");

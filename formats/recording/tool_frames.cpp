@@ -151,6 +151,25 @@ int compose_transform(Sequence& sequence,
     return static_cast<int>(sequence.transforms.size()) - 1;
 }
 
+void add_inverses(Sequence& sequence) {
+    static constexpr std::string_view kFrames[] = {"Tracker", "Reference", "Mannequin", "World",
+                                                   "Base",    "Ras",       "RAS",       "Phantom"};
+    for (const ToolRole role : {ToolRole::probe, ToolRole::needle}) {
+        if (find_tool(sequence, role) >= 0) continue;
+        for (std::size_t i = 0; i < sequence.transforms.size(); ++i) {
+            const std::string given = sequence.transforms[i];
+            const TransformName name = split_transform_name(given);
+            const std::string turned = std::string(name.to) + "To" + std::string(name.from);
+            if (std::find(std::begin(kFrames), std::end(kFrames), name.from) == std::end(kFrames) ||
+                rank_as_tool(turned, role) == 0 ||
+                compose_transform(sequence, name.to, name.from) < 0)
+                continue;
+            sequence.notes.push_back({"{} is the inverse of {}.", {turned, given}});
+            break;
+        }
+    }
+}
+
 bool in_two_frames(const std::string& probe, const std::string& needle) {
     const TransformName a = split_transform_name(probe), b = split_transform_name(needle);
     return !a.to.empty() && !b.to.empty() && a.to != b.to;

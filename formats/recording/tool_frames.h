@@ -39,6 +39,10 @@ int compose_transform(Sequence& sequence,
                       std::string_view to,
                       Message* said = nullptr);
 
+// Adds the poses of tools that a recording has only the other way round (TrackerToProbe), with a
+// note. What ends in a tool and begins in no tracker, reference or patient is a calibration.
+void add_inverses(Sequence& sequence);
+
 // Probe and needle in one frame. `probe` and `needle` are names of transforms or empty; one of them
 // is replaced by a composed one where they end in different frames, the mannequin before others. An
 // Error where nothing connects the two frames.

@@ -11,6 +11,7 @@
 #include <map>
 #include <numeric>
 #include <set>
+#include <tuple>
 
 #include "pipeline/anatomy/label_facts.h"
 #include "pipeline/anatomy/label_table.h"
@@ -31,7 +32,8 @@ constexpr double kAxisSpread = 0.09;             // of an axis about the size of
 constexpr double kDiagonal = 0.06, kTilt = 0.2;  // of the map's matrix, per unit of size
 
 // Densities of a label about which nothing is known, per axis and of its ln(volume).
-const double kNoPlace = -std::log(600.0), kNoVolume = -std::log(10.0);
+const double kNoPlace = -std::log(600.0), kNoVolume = -std::log(10.0), kNoLength = -std::log(4.0);
+const double kNothing = 3 * (kNoPlace + kNoLength) + kNoVolume;
 
 // Student's t of eight degrees of freedom: logarithm of the density at z standard deviations.
 constexpr double kFreedom = 8;
@@ -39,6 +41,10 @@ double student(double z2, double spread) {
     constexpr double kPeak = -0.9502;
     return kPeak - std::log(spread) - 0.5 * (kFreedom + 1) * std::log1p(z2 / kFreedom);
 }
+
+constexpr double kTogether = 0.6;      // correlation of the places of structures at one place
+constexpr double kNeighbours_mm = 80;  // over which it fades
+constexpr std::size_t kPairs = 6;      // of names that are tried exchanged
 
 constexpr double kMuch = 0.35;  // share of a cut structure without which it says little
 
@@ -101,6 +107,23 @@ struct AxisFit {
     }
 };
 
+// Density of a label's length along axis r of the map, ln.
+double length_density(const Seen& seen, const ModelStructure& s, int r, const AxisFit& axis) {
+    const double length = seen.label->length_mm[r];
+    if (!(length > 0)) return kNoLength;
+    // By the size of the body: the stretch of a fit is for places, whose middle it finds.
+    double whole2 = 0;
+    for (int c = 0; c < 3; ++c) whole2 += std::pow(axis.row[c] * s.length[c], 2);
+    const double stretch = axis.row.norm() / axis.size;
+    const double d = std::log(length * stretch) - 0.5 * std::log(whole2);
+    const double lost = seen.cut ? std::max(seen.lost, seen.lost_of(s, axis.size)) : 0;
+    const double spread = std::hypot(s.spread_ln / 3, s.shape_ln, 0.7 * lost);
+    const double density = student(d * d / (spread * spread), spread);
+    if (lost < kMuch) return density;
+    // A part may be of any length, but not longer than the whole.
+    return kNoLength + (d < 0 ? 0 : density - student(0, spread));
+}
+
 // Axes of the map as axes of the model: axis r of the map is axis m[r], with sign[r].
 struct Orientation {
     std::array<int, 3> m{0, 1, 2}, sign{1, 1, 1};
@@ -159,12 +182,13 @@ class Match {
 
     // Logarithm of the density of label i as structure s of a fit; null: of no structure.
     double density(std::size_t i, const ModelStructure* s, const Fit& fit) const {
-        if (s == nullptr) return 3 * kNoPlace + kNoVolume;
+        if (s == nullptr) return kNothing;
         double sum = volume_density(seen_[i], *s, kStep * (fit.k[0] + fit.k[1] + fit.k[2]));
         for (int r = 0; r < 3; ++r) {
             const AxisFit& a = fit.axes[r];
             sum += place_density(seen_[i], *s, r, a.m, a.size, voxel_[r],
-                                 seen_[i].label->centre[r] - a.at(s->at));
+                                 seen_[i].label->centre[r] - a.at(s->at)) +
+                   length_density(seen_[i], *s, r, a);
         }
         return sum;
     }
@@ -261,11 +285,12 @@ class Match {
         for (std::size_t i = 0; i < seen_.size(); ++i) {
             const ModelStructure* s = names_[i];
             if (s == nullptr) {
-                out.score += kNoPlace;
+                out.score += kNoPlace + kNoLength;
                 continue;
             }
             out.score += place_density(seen_[i], *s, r, m, size, voxel_[r],
-                                       seen_[i].label->centre[r] - out.at(s->at));
+                                       seen_[i].label->centre[r] - out.at(s->at)) +
+                         length_density(seen_[i], *s, r, out);
         }
         for (int c = 1; c < 4; ++c)
             out.score -= 0.5 * precision[c] * (b[c] - prior[c]) * (b[c] - prior[c]);
@@ -375,7 +400,7 @@ class Check {
 
     std::optional<double> agreement() {
         if (known() < kMinKnown) return std::nullopt;
-        const double none = known() * (3 * kNoPlace + kNoVolume);
+        const double none = known() * kNothing;
         return (match(names_).human({}).score - none) / known();
     }
 
@@ -391,6 +416,7 @@ class Check {
             sides();
             shifts();
             renamed();
+            exchanged(as_is);
             two_in_one();
             if (best_.score - right_.score > options_.margin) report.findings.push_back(finding());
             remarks(report);
@@ -612,6 +638,64 @@ class Check {
         }
     }
 
+    // Log of how much likelier the way from label i to label j is if their names are exchanged, beside
+    // what their places say: neighbours move together, so that it varies less than they do.
+    double way_gain(std::size_t i, std::size_t j) const {
+        const ModelStructure &a = *names_[i], &b = *names_[j];
+        const double near = norm(a.at - b.at) / kNeighbours_mm;
+        const double together = kTogether * std::exp(-near * near);
+        double gain = 0;
+        for (int r = 0; r < 3; ++r) {
+            if (seen_[i].says_nothing(a, r) || seen_[j].says_nothing(b, r)) continue;
+            const double seen = seen_[j].label->centre[r] - seen_[i].label->centre[r];
+            const double usual = right_.axes[r].at(b.at) - right_.axes[r].at(a.at);
+            const double v = variance(seen_[i], a, r, r, right_.axes[r].size, body_.voxel_mm[r]) +
+                             variance(seen_[j], b, r, r, right_.axes[r].size, body_.voxel_mm[r]);
+            const auto exchanged_against_right = [&](double v) {
+                return student((seen + usual) * (seen + usual) / v, 1) -
+                       student((seen - usual) * (seen - usual) / v, 1);
+            };
+            gain += exchanged_against_right(v * (1 - together)) - exchanged_against_right(v);
+        }
+        return gain;
+    }
+
+    // The names of two labels exchanged, for the few pairs that gain most by it.
+    void exchanged(Match& as_is) {
+        struct Pair {
+            double gain;
+            std::size_t i, j;
+        };
+        std::vector<Pair> pairs;
+        std::vector<double> own;
+        for (std::size_t i = 0; i < seen_.size(); ++i)
+            own.push_back(as_is.density(i, names_[i], right_));
+        for (std::size_t i = 0; i < seen_.size(); ++i)
+            for (std::size_t j = i + 1; j < seen_.size(); ++j) {
+                if (names_[i] == names_[j]) continue;
+                const double gain = as_is.density(i, names_[j], right_) - own[i] +
+                                    as_is.density(j, names_[i], right_) - own[j] + way_gain(i, j) -
+                                    change_cost(i, *names_[j]) - change_cost(j, *names_[i]);
+                pairs.push_back({gain, i, j});
+            }
+        const std::size_t few = std::min<std::size_t>(kPairs, pairs.size());
+        std::partial_sort(pairs.begin(), pairs.begin() + static_cast<std::ptrdiff_t>(few),
+                          pairs.end(), [](const Pair& a, const Pair& b) {
+                              return std::tie(b.gain, a.i, a.j) < std::tie(a.gain, b.i, b.j);
+                          });
+        for (std::size_t n = 0; n < few; ++n) {
+            const auto& [gain, i, j] = pairs[n];
+            Hypothesis h;
+            h.cause = AnatomyCause::names_exchanged;
+            h.names = names_;
+            std::swap(h.names[i], h.names[j]);
+            h.fit = match(h.names).human({});
+            h.score = h.fit.score + way_gain(i, j) - 0.5 - change_cost(i, *names_[j]) -
+                      change_cost(j, *names_[i]);
+            offer(h);
+        }
+    }
+
     // One name for a structure and its missing partner on the other side: the box holds both
     // places, as that of one alone never does, and its middle lies between them.
     void two_in_one() {
@@ -634,6 +718,7 @@ class Check {
             both.at = 0.5 * (own.at + second.at);
             both.spread = 1.3 * own.spread;
             both.half_mm += std::abs(own.at.x);
+            both.length.x = std::hypot(own.length.x, std::sqrt(12.0) * own.at.x);
             both.usual_ml *= 2;
             Names names = names_;
             names[i] = &both;
@@ -887,6 +972,15 @@ BodySummary summarise_body(const LabelVolume& labels, const Matrix3& ct_from_gri
         s.ml = static_cast<double>(f.count) * grid.voxel_volume_mm3() / 1000;
         s.centre = place(f.mean.x, f.mean.y, f.mean.z);
         s.box = box(f.lower, f.upper);
+        for (int r = 0; r < 3; ++r) {
+            double variance = 0;
+            for (int p = 0; p < 3; ++p) {
+                double along = 0;  // of the principal axis p, per voxel
+                for (int g = 0; g < 3; ++g) along += axes(r, g) * grid.spacing_mm[g] * f.axes(g, p);
+                variance += std::pow(along * f.spread[p], 2);
+            }
+            s.length_mm[r] = std::sqrt(12 * variance + std::pow(body.voxel_mm[r], 2));
+        }
         for (int g = 0; g < 3; ++g) {
             const int r = axis_of[g];
             const bool up = axes(r, g) > 0;
@@ -913,6 +1007,10 @@ constexpr double kOrderSpread = 3.5;    // standard deviations off the usual dis
 // for them.
 constexpr std::pair<const char*, double> kLeastMl[] = {
     {"body_trunc", 1000}, {"subcutaneous_fat", 200}, {"torso_fat", 50}, {"skeletal_muscle", 200}};
+
+double longest(const LabelSummary& label) {
+    return std::max({label.length_mm.x, label.length_mm.y, label.length_mm.z});
+}
 
 std::string would_be(const LabelSummary& label) {
     return std::to_string(label.value) + " would be " + label.name;
@@ -957,8 +1055,8 @@ NamesFit names_fit(const BodySummary& body) {
         const ModelStructure& structure = torso_model()[static_cast<std::size_t>(s)];
         if (label.ml > structure.max_ml)
             volumes.push_back(would_be(label) + text(" of %.0f ml", label.ml));
-        else if (label.length_mm > kLongest * structure.half_mm)
-            fit.misfits.push_back(would_be(label) + text(" %.0f mm long", label.length_mm));
+        else if (longest(label) > kLongest * structure.half_mm)
+            fit.misfits.push_back(would_be(label) + text(" %.0f mm long", longest(label)));
     }
     fit.gross = !volumes.empty();
     fit.misfits.insert(fit.misfits.begin(), volumes.begin(), volumes.end());

@@ -2,16 +2,16 @@
 
 // Whether a label map is the human torso that its names say: what no header can tell.
 //
-// Each named structure has a usual place, spread and volume in an adult's torso
-// (torso_model.cpp). The places of a map's labels are compared with them under several hypotheses:
+// Each named structure has a usual place, spread, volume and lengths in an adult's torso
+// (torso_model.cpp). A map's labels are compared with them under several hypotheses:
 // the map is right; its axes are turned round or exchanged; its unit or one spacing is wrong; its
 // names are shifted, exchanged or another table's; one name covers two organs. Each hypothesis may
 // still shift, stretch and tilt the model as bodies differ, with normal priors: about 12 % in size,
-// beside children, 9 % between axes, 12 degrees of tilt. Positions and logarithms of volumes have
-// Student's t distribution with eight degrees of freedom, such that no single organ decides. What a
-// cut face of the grid may have taken from an organ widens its spread along that axis. The
-// hypothesis of the greatest posterior density is reported if it beats "the map is right" by more
-// than AnatomyOptions::margin.
+// beside children, 9 % between axes, 12 degrees of tilt. Positions and logarithms of volumes and of
+// lengths along the axes have Student's t distribution with eight degrees of freedom, such that no
+// single organ decides. What a cut face of the grid may have taken from an organ widens its spread
+// along that axis. The hypothesis of the greatest posterior density is reported if it beats "the
+// map is right" by more than AnatomyOptions::margin.
 //
 // A finding is a likely cause and no proof, hence a warning; an error where no human body fits.
 // docs/anatomy-check.md has the rates of faults that are found, and of false alarms.
@@ -35,9 +35,11 @@ struct LabelSummary {
     std::string name;
     int value = 0;  // in the file
     double ml = 0;
-    Point3 centre;         // mean of its voxels
-    double length_mm = 0;  // of a rod that spreads as far along an axis; 0: not known
-    Box3 box;              // of its voxel centres
+    Point3 centre;  // mean of its voxels
+    // Of rods that spread as far along the axes of the frame: those of a box are its sides. 0: not
+    // known.
+    Vector3 length_mm{0, 0, 0};
+    Box3 box;                                   // of its voxel centres
     std::array<bool, 3> cut_low{}, cut_high{};  // it reaches the grid's face on that side
 };
 

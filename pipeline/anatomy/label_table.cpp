@@ -9,6 +9,7 @@
 #include "formats/files/atomic_file.h"
 #include "formats/text/json_reader.h"
 #include "pipeline/anatomy/tissue_table.h"
+#include "pipeline/base/source_checks.h"
 #include "pipeline/base/text.h"
 
 namespace sonocase::pipeline::inline anatomy {
@@ -98,7 +99,18 @@ int totalsegmentator_value(std::string_view name) {
 
 namespace {
 
-Result<LabelTable> table_of_rows(const std::vector<TextRow>& rows, const std::string& where) {
+// The cells from one on as one name: "left lung" without quotation marks is two of them.
+std::string joined_cells(const TextRow& row, std::size_t first, std::size_t end) {
+    std::string name;
+    for (std::size_t c = first; c < end; ++c)
+        if (!row.cells[c].empty()) name += (name.empty() ? "" : " ") + row.cells[c];
+    return name;
+}
+
+// blanks: they stand between the cells, and may stand within names.
+Result<LabelTable> table_of_rows(const std::vector<TextRow>& rows,
+                                 const std::string& where,
+                                 bool blanks) {
     if (rows.empty()) return Error{"label table is empty", where, "expected rows of value,name"};
     // A label description of ITK-SNAP: index, four of colour, two switches, name.
     const bool itk_snap =
@@ -124,7 +136,24 @@ Result<LabelTable> table_of_rows(const std::vector<TextRow>& rows, const std::st
         const std::string place = where + ":" + std::to_string(rows[r].line);
         LabelTableEntry entry;
         const auto value = whole_in(cell_at(rows[r], value_column));
-        entry.name = cell_at(rows[r], name_column);
+        const std::vector<std::string>& cells = rows[r].cells;
+        std::size_t used = cells.size();  // without empty ones at the end
+        while (used > 0 && cells[used - 1].empty()) --used;
+        const auto name_at = static_cast<std::size_t>(name_column);
+        std::size_t name_end = name_at + 1;
+        if (first == 1 && used > rows[0].cells.size()) {
+            if (name_at + 1 != rows[0].cells.size())
+                return Error{text("row of %zu cells under %zu names", used, rows[0].cells.size()),
+                             place, "put names with blanks or commas in quotation marks"};
+            name_end = used;
+        } else if (first == 0 && blanks) {
+            while (name_end < used && !number_in(cells[name_end])) ++name_end;
+        }
+        entry.name = name_end > name_at + 1 ? joined_cells(rows[r], name_at, name_end)
+                                            : cell_at(rows[r], name_column);
+        const int colour_at = colour_column < 0 ? -1
+                              : itk_snap        ? colour_column
+                                                : static_cast<int>(name_end);
         if (!value)
             return Error{"'" + cell_at(rows[r], value_column) + "' is not a label value", place,
                          "expected a whole number"};
@@ -133,11 +162,11 @@ Result<LabelTable> table_of_rows(const std::vector<TextRow>& rows, const std::st
                          "expected value,name"};
         entry.value = *value;
         entry.tissue_class = cell_at(rows[r], tissue_column);
-        if (colour_column >= 0) {
+        if (colour_at >= 0) {
             std::array<std::uint8_t, 3> rgb{};
             bool good = true;
             for (int c = 0; c < 3; ++c) {
-                const auto number = number_in(cell_at(rows[r], colour_column + c));
+                const auto number = number_in(cell_at(rows[r], colour_at + c));
                 good = good && number.has_value();
                 if (number) rgb[static_cast<std::size_t>(c)] = colour_byte(*number, false);
             }
@@ -149,6 +178,28 @@ Result<LabelTable> table_of_rows(const std::vector<TextRow>& rows, const std::st
                     [](const LabelTableEntry& entry) { return number_in(entry.name).has_value(); }))
         return Error{"label table has numbers in place of names", where,
                      "expected rows of value,name"};
+    return table;
+}
+
+// [{"id": 5, "name": "liver"}, ...]
+LabelTable table_of_objects(const detail::Json& list) {
+    LabelTable table;
+    for (const detail::Json& item : list) {
+        std::optional<int> value;
+        std::string name;
+        if (!item.is_object()) return {};
+        for (const char* key : {"value", "id", "index", "label", "labelValue"})
+            if (const auto found = item.find(key); !value && found != item.end() &&
+                                                   found->is_number_integer() &&
+                                                   std::abs(found->get<double>()) <= 2147483647.0)
+                value = found->get<int>();
+        for (const char* key : {"name", "label", "title"})
+            if (const auto found = item.find(key);
+                name.empty() && found != item.end() && found->is_string())
+                name = found->get<std::string>();
+        if (!value || name.empty()) return {};
+        table.push_back({*value, name, {}, {}, 0});
+    }
     return table;
 }
 
@@ -168,6 +219,7 @@ Result<LabelTable> parse_label_json(std::string_view text, const std::string& wh
         for (std::size_t n = 0; n < labels.size(); ++n)
             if (labels[n].is_string())
                 table.push_back({static_cast<int>(n), labels[n].get<std::string>(), {}, {}, 0});
+        if (table.empty()) table = table_of_objects(labels);
         if (table.size() != labels.size()) table.clear();
     } else if (labels.is_object()) {
         for (const auto& [key, value] : labels.items()) {
@@ -210,12 +262,26 @@ Result<LabelTable> parse_label_table(std::string_view text, const std::string& w
                          "save the table as CSV UTF-8"};
         rest.remove_prefix(std::min(end + 1, rest.size()));
     }
-    if (trimmed(text.starts_with("\xEF\xBB\xBF") ? text.substr(3) : text).starts_with('{'))
-        return parse_label_json(text.starts_with("\xEF\xBB\xBF") ? text.substr(3) : text, where);
-    return table_of_rows(split_rows(text), where);
+    if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+    const std::string_view start = trimmed(text);
+    if (start.starts_with('{')) return parse_label_json(text, where);
+    if (start.starts_with('['))
+        return parse_label_json("{\"labels\":" + std::string(text) + "}", where);
+    if (lower_case(text.substr(0, 4)) == "sep=")  // Excel's line of the separator
+        text.remove_prefix(std::min(text.find('\n'), text.size()));
+    char separator = 0;
+    for (std::string_view rest = text; separator == 0 && !rest.empty();) {
+        const std::size_t end = std::min(rest.find_first_of("\r\n"), rest.size());
+        const std::string_view first = trimmed(rest.substr(0, end));
+        rest.remove_prefix(std::min(end + 1, rest.size()));
+        if (!first.empty() && first.front() != '#' && !first.starts_with("//"))
+            separator = separator_of(first);
+    }
+    return table_of_rows(split_rows(text), where, separator == ' ');
 }
 
 Result<LabelTable> load_label_table(const std::string& path) {
+    SONOCASE_TRY_DONE(check_source_file(path, "expected a label table"));
     SONOCASE_TRY(auto text, read_text_file(path));
     return parse_label_table(text, path);
 }

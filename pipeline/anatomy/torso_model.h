@@ -21,9 +21,11 @@ struct ModelStructure {
     int side = 0;        // 1 right, -1 left, 0: no side
     Vector3 at, spread;  // mean and standard deviation
     double half_mm = 0;  // half of its greatest extent
+    Vector3 length;      // of rods that spread as far along x, y and z
     double min_ml = 0, usual_ml = 0, max_ml = 0;  // limits over all ages and most diseases
     double spread_ln = 0;                         // standard deviation of ln(volume) in adults
-    int other = -1;                               // index of the same structure on the other side
+    double shape_ln = 0.28;  // of ln(length), beside what the volume's spread leaves
+    int other = -1;          // index of the same structure on the other side
 };
 
 // All structures; a paired one is there twice. The same object at every call. Thread-safe.

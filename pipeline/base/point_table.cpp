@@ -41,6 +41,14 @@ std::vector<Line> lines_of(std::string_view text) {
             line.remove_prefix(1);
         while (!line.empty() && line.back() == ' ') line.remove_suffix(1);
         if (trimmed(line).empty()) continue;
+        // "[1, 2, 3]," and "(1, 2, 3)" as programs print them.
+        if (line.front() == '[' || line.front() == '(') {
+            const std::size_t end = line.find_last_not_of(",; ");
+            const char last = line[end];
+            if ((last == ']' || last == ')') && line.find_first_of("[(", 1) == line.npos)
+                line = trimmed(line.substr(1, end - 1));
+            if (line.empty()) continue;
+        }
         const bool comment = line.front() == '#' || line.front() == '%' || line.starts_with("//");
         if (comment)
             line = trimmed(line.substr(std::min(line.find_first_not_of("#%/"), line.size())));
@@ -355,6 +363,10 @@ std::string reading(std::initializer_list<const char*> first, std::size_t count)
 }
 
 Error which_columns(std::size_t count, const std::string& why, const std::string& place) {
+    constexpr std::size_t kMany = 40;  // of one row: a list of numbers, or poses as matrices
+    if (count > kMany)
+        return Error{"which columns are x, y and z? " + why, place,
+                     "write one point in each row, with x,y,z above the first"};
     std::string readings = reading({"x", "y", "z"}, count);
     if (count == 4) {
         readings += " or " + reading({"n", "x", "y", "z"}, count) + " or " +
@@ -380,6 +392,10 @@ bool is_hole(std::string_view cell) {
     const std::string word = lower_case(cell);
     return is_one_of(word, {"", "-", "--", "na", "n/a", "#n/a", "nan", "null", "none", "missing",
                             "no data", "nodata"});
+}
+
+bool is_digits(std::string_view cell) {
+    return cell.find_first_not_of("+-0123456789") == cell.npos;
 }
 
 bool is_ok(std::string_view status) {
@@ -679,7 +695,7 @@ class Parser {
     Status read_nameless(PointTable& table) {
         std::size_t count = 0;
         bool first_is_word = false;
-        bool unit_normals = true, colours = true;
+        bool unit_normals = true, colours = true, whole = true;
         std::vector<double> first_column;
         const Line* first_line = nullptr;
         for (std::size_t n = layout_.first; n < lines_.size(); ++n) {
@@ -711,6 +727,10 @@ class Parser {
                                  std::to_string(count),
                              place(line), "give every row the same columns"};
             if (const auto value = cells_.number(0)) first_column.push_back(*value);
+            for (std::size_t c = 0; c < 3 && whole; ++c) {
+                const auto value = cells_.number(c);
+                whole = !value || (*value == std::floor(*value) && is_digits(cells_[c]));
+            }
             if (count == 6) {
                 double square = 0;
                 for (std::size_t c = 3; c < 6; ++c) {
@@ -725,6 +745,14 @@ class Parser {
             keep(table, ok, point);
         }
         if (first_line == nullptr) return Done{};
+        if (count == 6 && whole && layout_.separator == ',') {
+            cells_.split(first_line->text, layout_.separator);
+            return Error{
+                "6 columns of whole numbers: is a decimal comma among them? " + cell_list(cells_),
+                place(*first_line),
+                "put ';' between numbers with a decimal comma, or above the first row the "
+                "line of names that is true: 'x,y,z,c4,c5,c6'"};
+        }
         if (count == 6 && !unit_normals) {
             layout_.columns.normal = {-1, -1, -1};
             table.normals.clear();

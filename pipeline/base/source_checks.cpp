@@ -6,6 +6,7 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 
 #include "formats/files/atomic_file.h"
 
@@ -16,6 +17,34 @@ namespace sonocase::pipeline::inline base {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+// What stands in the place of files that were not downloaded, and what they come packed in.
+Status expect_no_foreign(const std::string& path) {
+    std::string head(64, '\0');
+    std::ifstream file(path, std::ios::binary);
+    file.read(head.data(), static_cast<std::streamsize>(head.size()));
+    head.resize(static_cast<std::size_t>(file.gcount()));
+    const std::string text = lower_case(trimmed(head));
+    if (text.starts_with("version https://git-lfs"))
+        return Error{"is a pointer of Git LFS", path, "fetch the file itself: git lfs pull"};
+    if (text.starts_with("<!doctype html") || text.starts_with("<html"))
+        return Error{"is a web page", path, "download the file itself: a login may be asked for"};
+    for (const auto& [sign, kind] :
+         {std::pair<std::string_view, const char*>{"PK\x03\x04", "a zip archive"},
+          {"7z\xBC\xAF", "a 7-Zip archive"},
+          {"Rar!", "a RAR archive"},
+          {"%PDF", "a PDF"}})
+        if (head.starts_with(sign))
+            return lower_case(path).ends_with(".xlsx") || lower_case(path).ends_with(".ods")
+                       ? Error{"is a spreadsheet", path, "save the table as CSV UTF-8"}
+                       : Error{std::string("is ") + kind, path,
+                               "unpack it, and give what it holds"};
+    return Done{};
+}
+
+}  // namespace
+
 Status check_source_file(const std::string& path, const std::string& expected) {
     std::error_code code;
     const fs::file_status status = fs::status(path, code);
@@ -24,7 +53,7 @@ Status check_source_file(const std::string& path, const std::string& expected) {
     if (code) return Error{"cannot open: " + code.message(), path, "check that it may be read"};
     if (Status regular = expect_regular_file(path, expected); !regular) return regular;
     if (fs::file_size(path, code) == 0) return Error{"file is empty", path, "export it again"};
-    return Done{};
+    return expect_no_foreign(path);
 }
 
 Status check_source_folder(const std::string& folder, const std::string& expected) {

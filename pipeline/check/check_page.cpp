@@ -10,6 +10,7 @@
 #include "formats/text/number_text.h"
 #include "pipeline/check/case_labels.h"
 #include "pipeline/check/check_case.h"
+#include "pipeline/export/error_budget.h"
 #include "pipeline/pictures/markup.h"
 #include "pipeline/pictures/png.h"
 
@@ -164,7 +165,8 @@ std::string views(const CaseBundle& bundle, const CheckResult& result) {
 }
 
 // A plane through the middle of the volume at right angles to `axis`, labels in their colours.
-std::string plane(const CaseBundle& bundle, int axis) {
+using Colours = std::vector<std::array<std::uint8_t, 3>>;  // # labels
+std::string plane(const CaseBundle& bundle, int axis, const Colours& colours) {
     const Int3 size = bundle.grid.size;
     const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
     const int width = size[u], height = size[v];
@@ -176,10 +178,65 @@ std::string plane(const CaseBundle& bundle, int axis) {
             p[axis] = size[axis] / 2;
             p[u] = x;
             p[v] = y;
-            const Label& label = bundle.labels[bundle.label_bricks.at(p.x, p.y, p.z)];
-            for (const std::uint8_t c : label.colour) rgb[at++] = c;
+            for (const std::uint8_t c : colours[bundle.label_bricks.at(p.x, p.y, p.z)])
+                rgb[at++] = c;
         }
     return picture("plane", png_from_rgb(rgb.data(), width, height));
+}
+
+std::string planes(const CaseBundle& bundle, const Colours& colours) {
+    return plane(bundle, 0, colours) + plane(bundle, 1, colours) + plane(bundle, 2, colours);
+}
+
+Colours own_colours(const CaseBundle& bundle) {
+    Colours colours;
+    for (const Label& label : bundle.labels)
+        colours.push_back({label.colour[0], label.colour[1], label.colour[2]});
+    return colours;
+}
+
+// The darker, the less is known of a structure's place.
+struct Step {
+    double to_mm;
+    const char* words;
+    std::array<std::uint8_t, 3> colour;
+};
+constexpr Step kSteps[] = {{2, "within 2 mm", {255, 245, 200}},
+                           {5, "2 to 5 mm", {253, 204, 110}},
+                           {10, "5 to 10 mm", {244, 140, 60}},
+                           {20, "10 to 20 mm", {205, 60, 35}},
+                           {1e9, "more than 20 mm", {120, 10, 45}}};
+
+const Step& step_of(double mm) {
+    return *std::find_if(std::begin(kSteps), std::end(kSteps),
+                         [mm](const Step& step) { return !(mm >= step.to_mm); });
+}
+
+// Planes coloured by how far from its place each structure may lie, and the figures.
+std::string unknown_part(const CaseBundle& bundle) {
+    const std::vector<UnknownPlace> places = unknown_places(bundle.manifest.stages);
+    if (places.empty()) return "";
+    Colours colours(bundle.labels.size(), {150, 150, 150});  // a structure of later stages
+    colours[0] = {0, 0, 0};
+    std::string rows, legend;
+    for (const UnknownPlace& place : places) {
+        for (std::size_t l = 1; l < bundle.labels.size(); ++l)
+            if (bundle.labels[l].name == place.label) colours[l] = step_of(place.p90_mm).colour;
+        rows += html().filled(
+            "unknown_row",
+            {{"label", escaped_html(place.label)},
+             {"mm", number(place.p90_mm)},
+             {"held", place.with_landmarks_mm > 0 ? number(place.with_landmarks_mm) : ""}});
+    }
+    for (const Step& step : kSteps)
+        legend += html().filled(
+            "step", {{"rgb", std::to_string(step.colour[0]) + "," + std::to_string(step.colour[1]) +
+                                 "," + std::to_string(step.colour[2])},
+                     {"words", step.words}});
+    return html().filled("unknown", {{"planes", planes(bundle, colours)},
+                                     {"legend", legend},
+                                     {"advice", escaped_html(landmark_advice(places))},
+                                     {"rows", rows}});
 }
 
 std::string faults_part(const CheckResult& result) {
@@ -248,7 +305,8 @@ std::string check_page(const CaseBundle& bundle, const CheckResult& result) {
         "page",
         {{"case", escaped_html(bundle.manifest.case_name)},
          {"faults", faults_part(result)},
-         {"planes", plane(bundle, 0) + plane(bundle, 1) + plane(bundle, 2)},
+         {"planes", planes(bundle, own_colours(bundle))},
+         {"unknown", unknown_part(bundle)},
          {"views", views(bundle, result)},
          {"ribs_right", std::to_string(result.ribs_right)},
          {"ribs_left", std::to_string(result.ribs_left)},

@@ -11,6 +11,8 @@
 #include "pipeline/base/stopwatch.h"
 #include "pipeline/base/text.h"
 #include "pipeline/import/volume/volume_file.h"
+#include "pipeline/registration/register_surfaces.h"
+#include "pipeline/segmentation/cooked_grid.h"
 #include "pipeline/segmentation/distance/label_distance.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "pipeline/stages/import_stage.h"
@@ -55,6 +57,19 @@ double region_voxels(const Recipe& recipe, const RegionRequest& region) {
     return e.x * e.y * e.z / std::pow(region.voxel_mm, 3) / 1e6;
 }
 
+// How many voxels the boxes of the labels have, for one of the map: distances are measured in them.
+double box_share(const AnalyticBody& body) {
+    const LabelVolume map = sample_analytic_torso(analytic_torso_grid({8, 8, 8}), body);
+    double voxels = 0;
+    for (std::size_t l = 1; l < map.labels.size(); ++l) {
+        const Box3 box = box_of_label(map, map.labels[l].name, 0);
+        if (box.empty()) continue;
+        const Vector3 e = box.extent();
+        voxels += (e.x / 8 + 1) * (e.y / 8 + 1) * (e.z / 8 + 1);
+    }
+    return voxels / static_cast<double>(map.voxels.size());
+}
+
 }  // namespace
 
 CaseSize case_size(const Recipe& recipe) {
@@ -64,7 +79,12 @@ CaseSize case_size(const Recipe& recipe) {
         const Grid grid = analytic_torso_grid({in.voxel_mm, in.voxel_mm, in.slice_mm});
         const auto voxels = static_cast<double>(grid.voxel_count());
         size.label_voxels = voxels / 1e6;
+        // A phantom's tubes have small boxes; the law is that of a torso's organs.
+        if (in.body.tubes) size.label_voxels *= std::min(1.0, box_share(in.body) / box_share({}));
         size.interpolated_nodes = nodes_between_slices(grid.spacing_mm, voxels);
+    } else if (is_mesh_source(recipe.resolve(recipe.inputs.labels))) {
+        if (const auto grid = mesh_inputs_grid(recipe))
+            size.label_voxels = size.mesh_voxels = static_cast<double>(grid->voxel_count()) / 1e6;
     } else {
         const VolumeSize labels = size_in_headers(recipe.resolve(recipe.inputs.labels));
         size.label_mb = static_cast<double>(labels.bytes) / 1e6;
@@ -125,6 +145,9 @@ constexpr double kFixedS = 5.53, kTextureS = 1.25, kVolumeS = 0.1003, kSurfaceS 
                  kLabelsS = 0.52, kLabelsWithin = 3;
 // Resampling holds a map of more voxels in 16-bit numbers, which takes less for each.
 constexpr double kLargeS = 0.4, kLargeFrom = 30;
+// What organ meshes take before they are voxels, and for a million of these; the fit, which a known
+// map does without; and one refit to half of the readings, without an elastic warp.
+constexpr double kMendS = 3.3, kMeshS = 0.28, kFitS = 2.3, kRefitS = 0.27;
 // What one thread does alone: the start, the import, textures, the fit's last steps, packing.
 constexpr double kSerialS = 3.0, kSerialVolumeS = 0.012;
 // Seconds of the probe below when those builds were measured.
@@ -150,7 +173,8 @@ BuildTime build_time(const CaseSize& size, int texture_edge, double speed, int t
         (kFixedS + kTextureS * std::pow(texture_edge / 64.0, 3) +
          kVolumeS * (cooked + size.region_voxels) + kSurfaceS * std::cbrt(cooked * cooked) +
          kLabelsS * std::clamp(size.label_voxels - kLabelsWithin, 0.0, kLargeFrom - kLabelsWithin) +
-         kLargeS * std::max(0.0, size.label_voxels - kLargeFrom));
+         kLargeS * std::max(0.0, size.label_voxels - kLargeFrom) +
+         (size.mesh_voxels > 0 ? kMendS : 0) + kMeshS * size.mesh_voxels);
     const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
     const double serial = std::min(time.processor_s, speed * (kSerialS + kSerialVolumeS * cooked));
     const int shared_by = threads > 0 ? std::min(threads, cores) : cores;
@@ -163,7 +187,17 @@ BuildTime build_time(
     CaseSize now = size;
     const double voxel_mm = recipe.settings.of<ResampleOptions>().voxel_mm;
     now.cooked_voxels *= std::pow(sized_voxel_mm / voxel_mm, 3);
-    return build_time(now, recipe.settings.of<TextureStageOptions>().bank.edge, speed, threads);
+    BuildTime time =
+        build_time(now, recipe.settings.of<TextureStageOptions>().bank.edge, speed, threads);
+    const RegisterOptions& fit = recipe.settings.of<RegisterOptions>();
+    const bool known = recipe.inputs.analytic && recipe.inputs.torso.known_map;
+    const double more_s = speed * (known                     ? -kFitS
+                                   : fit.uncertainty == "on" ? kRefitS * fit.refits
+                                                             : 0);
+    const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    time.processor_s += more_s;
+    time.alone_s += more_s / (threads > 0 ? std::min(threads, cores) : cores);
+    return time;
 }
 
 double machine_speed() {

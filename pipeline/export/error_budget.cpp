@@ -2,10 +2,13 @@
 
 #include "pipeline/export/error_budget.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <string_view>
+
+#include "pipeline/base/text.h"
 
 namespace sonocase::pipeline::inline exporting {
 
@@ -43,12 +46,50 @@ ErrorBudget error_budget(std::span<const StageReport> stages) {
                 "what this case's readings leave open; landmarks far apart lower it");
         else
             add(stage_names::kWarp, "organs along the skin and deep in the body",
-                std::numeric_limits<double>::quiet_NaN(), "the fit found no quadratic to judge by");
+                std::numeric_limits<double>::quiet_NaN(),
+                "too few readings have a counterpart to judge by");
     }
     if (const auto voxel = measure_of(stages, stage_names::kResample, "voxel_mm"))
         add(stage_names::kResample, "surfaces between the voxels of the case",
             kCookedShare * *voxel, "a twentieth of its voxel, as measured on the analytic torso");
     return budget;
+}
+
+bool is_untold(const Note& note) {
+    const bool of_pose = note.name == "head" || note.name == "handedness" || note.name == "front";
+    return of_pose && !note.text.starts_with("right");
+}
+
+std::vector<UnknownPlace> unknown_places(std::span<const StageReport> stages) {
+    std::vector<UnknownPlace> places;
+    for (const StageReport& report : stages) {
+        if (report.stage != stage_names::kWarp) continue;
+        for (const MeasureGroup& group : report.groups) {
+            if (group.name == "unknown_p90_mm")
+                for (const Measure& m : group.values) places.push_back({m.name, m.value, 0});
+            if (group.name != "unknown_p90_with_two_landmarks_mm") continue;
+            for (UnknownPlace& place : places)
+                for (const Measure& m : group.values)
+                    if (m.name == place.label) place.with_landmarks_mm = m.value;
+        }
+    }
+    std::stable_sort(
+        places.begin(), places.end(),
+        [](const UnknownPlace& a, const UnknownPlace& b) { return a.p90_mm > b.p90_mm; });
+    return places;
+}
+
+std::string landmark_advice(std::span<const UnknownPlace> places) {
+    const UnknownPlace* most = nullptr;
+    const auto gain = [](const UnknownPlace& p) { return p.p90_mm - p.with_landmarks_mm; };
+    for (const UnknownPlace& place : places) {
+        if (!(place.with_landmarks_mm > 0) || place.with_landmarks_mm > 0.9 * place.p90_mm)
+            continue;
+        if (most == nullptr || gain(place) > gain(*most)) most = &place;
+    }
+    if (most == nullptr) return "";
+    return text("two landmarks far apart would bring %s from %.1f to %.1f mm", most->label.c_str(),
+                most->p90_mm, most->with_landmarks_mm);
 }
 
 }  // namespace sonocase::pipeline::inline exporting

@@ -3,8 +3,7 @@
 // Where the millimetres of a case's error come from, according to the reports of its stages.
 //
 // Every entry is a mean displacement of surfaces, so that entries can be compared. Their causes are
-// independent, so they are added as the root of the sum of squares. A fit of skins says nothing
-// about the depth of the body; that entry has no number.
+// independent, so they are added as the root of the sum of squares.
 #pragma once
 
 #include <cstddef>
@@ -28,14 +27,27 @@ struct ErrorBudget {
     double known_mm = 0;               // of the entries with a number
 };
 
-// The setting that would lower the error next, and its cost; from the measured settings
-// (pipeline/tradeoff/choose_settings.h).
+// What would lower this case's error next, and its cost (pipeline/tradeoff/choose_settings.h).
 struct NextStep {
-    std::string settings;  // "resample.voxel_mm=1"; empty: nothing measured is better
+    std::string step;  // "resample.voxel_mm=1", "two landmarks far apart"; empty: nothing does
     double error_from_mm = 0;
     double error_to_mm = 0;
-    double more_seconds = 0;  // on the machine of the sweep
+    double more_seconds = 0;  // > 0, on the machine of the sweep; of landmarks 0
 };
+
+// How far from its true place a structure may lie on the mannequin, by what the fit reports.
+struct UnknownPlace {
+    std::string label;
+    double p90_mm = 0;             // nine times in ten it lies nearer
+    double with_landmarks_mm = 0;  // the same if two landmarks were given; 0: that is not known
+};
+
+// Worst first; empty where the case's map was not fitted.
+std::vector<UnknownPlace> unknown_places(std::span<const StageReport> stages);
+
+// "two landmarks far apart would bring liver from 11 to 3 mm": the structure that they help most.
+// Empty where they bring none nearer by a tenth.
+std::string landmark_advice(std::span<const UnknownPlace> places);
 
 // An entry is left out where its stage did not report what it is computed from.
 ErrorBudget error_budget(std::span<const StageReport> stages);
@@ -45,5 +57,9 @@ ErrorBudget error_budget(std::span<const StageReport> stages);
 // (tests/pipeline/tradeoff/error_budget_test.cpp repeats it).
 inline constexpr double kSampledShare = 0.085;
 inline constexpr double kCookedShare = 0.05;
+
+// Whether a note of the fit says that the skin does not tell head from feet, right from left or
+// front from back ("head", "handedness", "front"; pipeline/registration/pose_choice.h).
+bool is_untold(const Note& note);
 
 }  // namespace sonocase::pipeline::inline exporting

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <set>
+#include <span>
 
 #include <nlohmann/json.hpp>
 
@@ -61,8 +62,8 @@ Json budget_json(const ErrorBudget& budget, const NextStep& next) {
     }
     json["known_mm"] = budget.known_mm;
     json["next"] = nullptr;
-    if (!next.settings.empty())
-        json["next"] = {{"settings", next.settings},
+    if (!next.step.empty())
+        json["next"] = {{"step", next.step},
                         {"error_from_mm", next.error_from_mm},
                         {"error_to_mm", next.error_to_mm},
                         {"more_seconds", next.more_seconds}};
@@ -72,19 +73,49 @@ Json budget_json(const ErrorBudget& budget, const NextStep& next) {
 std::string budget_text(const ErrorBudget& budget, const NextStep& next) {
     std::string text = "\nerror budget, mean displacement of surfaces\n";
     for (const BudgetEntry& e : budget.entries) {
-        char mm[16] = "     ?";
-        if (std::isfinite(e.mm)) std::snprintf(mm, sizeof mm, "%6.2f", e.mm);
-        text +=
-            line("  %-10s %s mm  %s (%s)", e.stage.c_str(), mm, e.cause.c_str(), e.basis.c_str());
+        if (std::isfinite(e.mm))
+            text += line("  %-10s %6.2f mm  %s (%s)", e.stage.c_str(), e.mm, e.cause.c_str(),
+                         e.basis.c_str());
+        else
+            text += line("  %-10s not known  %s: %s", e.stage.c_str(), e.cause.c_str(),
+                         e.basis.c_str());
     }
     text += line("  %-10s %6.2f mm", "known", budget.known_mm);
-    if (next.settings.empty())
-        text += "  no setting that was measured does better\n";
+    if (next.step.empty())
+        text += "  nothing measured lowers it by a hundredth\n";
+    else if (next.more_seconds > 0)
+        text += line("  next: %s, from %.2f to %.2f mm for %.2g s more", next.step.c_str(),
+                     next.error_from_mm, next.error_to_mm, next.more_seconds);
     else
-        text +=
-            line("  next: %s, from %.2f to %.2f mm on the synthetic bodies for %.0f s more",
-                 next.settings.c_str(), next.error_from_mm, next.error_to_mm, next.more_seconds);
+        text += line("  next: %s, from %.2f to %.2f mm", next.step.c_str(), next.error_from_mm,
+                     next.error_to_mm);
     return text;
+}
+
+// The structures whose place on the mannequin is known least.
+std::string unknown_text(std::span<const StageReport> stages) {
+    const std::vector<UnknownPlace> places = unknown_places(stages);
+    if (places.empty()) return "";
+    std::string text =
+        "\nplace of the structures, by what the readings leave open if the patient lies as fitted: "
+        "nine times in ten within\n";
+    for (std::size_t n = 0; n < std::min<std::size_t>(5, places.size()); ++n)
+        text += line("  %-32s %6.1f mm", places[n].label.c_str(), places[n].p90_mm);
+    if (places.size() > 5)
+        text += line("  the other %zu within %.1f mm", places.size() - 5, places[5].p90_mm);
+    if (const std::string advice = landmark_advice(places); !advice.empty())
+        text += "  " + advice + "\n";
+    return text;
+}
+
+Json unknown_json(std::span<const StageReport> stages) {
+    Json json = Json::array();
+    for (const UnknownPlace& place : unknown_places(stages)) {
+        Json entry{{"label", place.label}, {"p90_mm", place.p90_mm}};
+        if (place.with_landmarks_mm > 0) entry["with_two_landmarks_mm"] = place.with_landmarks_mm;
+        json.push_back(std::move(entry));
+    }
+    return json;
 }
 
 // The mechanics of a label, not of its tissue, which veins and arteries may share.
@@ -257,6 +288,7 @@ std::string inspection_json(const CaseBundle& bundle, const Inspection& inspecti
     for (std::size_t i = 0; i < bundle.manifest.stages.size(); ++i)
         json["stages"].push_back(stage_json(bundle.manifest.stages[i], inspection.seconds[i]));
     json["error_budget"] = budget_json(error_budget(bundle.manifest.stages), inspection.next);
+    json["unknown"] = unknown_json(bundle.manifest.stages);
     json["exercises"] = Json::array();
     for (const EmbeddedExercise& embedded : bundle.exercises) {
         Json exercise{{"name", embedded.name}};
@@ -344,6 +376,7 @@ std::string inspection_text(const CaseBundle& bundle, const Inspection& inspecti
     else
         text += "  (seconds stand in BUNDLE.report.json, which is not beside this bundle)\n";
     text += budget_text(error_budget(bundle.manifest.stages), inspection.next);
+    text += unknown_text(bundle.manifest.stages);
     text += "\nexercises\n";
     for (const EmbeddedExercise& embedded : bundle.exercises) {
         const auto exercise = parse_exercise(embedded.toml, embedded.name);

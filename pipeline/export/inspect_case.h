@@ -37,8 +37,9 @@ struct Inspection {
 // [{"index", "name", "tissue", "mechanics": {"stiffness_kpa", "drains", "puncture_n", "rigid"},
 // "volume_ml"}], "tissues": [...], "stages": [{"name", "version",
 // "seconds", "errors": {measure: value}, "warnings"}], "error_budget": {"entries": [{"stage",
-// "cause", "mm" or null, "basis"}], "known_mm", "next": null or {"settings", "error_from_mm",
-// "error_to_mm", "more_seconds"}}, "exercises", "inputs", "surfaces", "textures", "has"}.
+// "cause", "mm" or null, "basis"}], "known_mm", "next": null or {"step", "error_from_mm",
+// "error_to_mm", "more_seconds"}}, "unknown": [{"label", "p90_mm", "with_two_landmarks_mm" where it
+// is known}] worst first, "exercises", "inputs", "surfaces", "textures", "has"}.
 std::string inspection_json(const CaseBundle& bundle, const Inspection& inspection);
 std::string inspection_text(const CaseBundle& bundle, const Inspection& inspection);
 

@@ -63,7 +63,9 @@ std::vector<std::uint8_t> segment_list(const SiteCase& site) {
     return out;
 }
 
-std::string site_list_json(const std::vector<SiteCase>& cases, const std::string& xapi) {
+std::string site_list_json(const std::vector<SiteCase>& cases,
+                           const std::string& xapi,
+                           const std::string& xapi_auth) {
     using detail::Json;
     Json list = Json::array();
     for (const SiteCase& one : cases) {
@@ -96,6 +98,7 @@ std::string site_list_json(const std::vector<SiteCase>& cases, const std::string
     out["format"] = "sonocase site";
     out["version"] = 2;
     out["xapi"] = xapi;
+    if (!xapi_auth.empty()) out["xapi_auth"] = xapi_auth;
     out["cases"] = std::move(list);
     return detail::json_text(out, false) + "\n";
 }
@@ -156,9 +159,24 @@ Result<std::string> pose_origin(const std::string& address) {
     return origin;
 }
 
+// "Basic ..." of USER:SECRET; what names its scheme already stays.
+std::string authorization(const std::string& key) {
+    if (key.empty() || key.find(' ') != std::string::npos) return key;
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(key.data());
+    return "Basic " + base64({bytes, key.size()});
+}
+
 // The hosts besides its own that the page may connect to.
 Result<std::string> other_hosts(const PublishOptions& options) {
     std::string out;
+    const std::string& key = options.xapi_key;
+    const bool printable =
+        std::all_of(key.begin(), key.end(), [](char c) { return c >= ' ' && c < 127; });
+    const bool has_form = printable && key.find_first_of(": ") != std::string::npos;
+    if (!key.empty() && (options.xapi.empty() || !has_form)) {
+        return Error{"a key without a store, or of another form", "--xapi-key",
+                     "give --xapi ENDPOINT as well, and USER:SECRET or 'Bearer TOKEN'"};
+    }
     if (!options.xapi.empty()) {
         SONOCASE_TRY(const auto origin, store_origin(options.xapi));
         out += " " + origin;
@@ -195,8 +213,10 @@ Result<Published> publish_page(const std::vector<ReadCase>& cases,
     SONOCASE_TRY(auto page, read_text_file(program + "/single.html"));
     SiteCase site = cases[0].site;
     site.preview.clear();
-    const std::string list = "<script type=\"application/json\" id=\"site-list\">" +
-                             inside_page(site_list_json({site}, options.xapi)) + "</script>";
+    const std::string list =
+        "<script type=\"application/json\" id=\"site-list\">" +
+        inside_page(site_list_json({site}, options.xapi, authorization(options.xapi_key))) +
+        "</script>";
     const std::string data = "<script type=\"text/plain\" id=\"case-" + site.name + "\">" +
                              base64(cases[0].bytes) + "</script>";
     SONOCASE_TRY(const auto hosts, other_hosts(options));
@@ -265,7 +285,8 @@ Result<Published> publish(const std::vector<std::string>& cases,
         write(name, std::span<const std::uint8_t>(bytes));
     }
     write("index.html", std::string_view(index));
-    write("cases.json", std::string_view(site_list_json(list, options.xapi)));
+    write("cases.json",
+          std::string_view(site_list_json(list, options.xapi, authorization(options.xapi_key))));
     if (!written) return written.error();
     return out;
 }

@@ -46,13 +46,18 @@ Result<ReadCase> site_case(std::span<const std::uint8_t> bytes, const std::strin
 std::vector<std::uint8_t> segment_list(const SiteCase& site);
 
 // The text of cases.json.
-std::string site_list_json(const std::vector<SiteCase>& cases, const std::string& xapi);
+std::string site_list_json(const std::vector<SiteCase>& cases,
+                           const std::string& xapi,
+                           const std::string& xapi_auth = "");
 
 struct PublishOptions {
     std::string program_folder;  // what scripts/web built; empty: looked for, see find_program()
     std::string xapi;            // address of a learning record store; empty: none
-    std::string poses;           // origin of a pose server, ws://HOST:PORT; empty: none
-    bool single_file = false;    // one .html with exactly one case
+    // USER:SECRET or a whole Authorization of that store, which everyone who opens the site can
+    // read; empty: none.
+    std::string xapi_key;
+    std::string poses;         // origin of a pose server, ws://HOST:PORT; empty: none
+    bool single_file = false;  // one .html with exactly one case
 };
 
 struct Published {

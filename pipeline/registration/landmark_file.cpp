@@ -32,6 +32,16 @@ Result<PointTable> load_marks(const std::string& path) {
     SONOCASE_TRY(auto marks, load_point_table(path, {.names = true}));
     if (marks.names.empty() || marks.names.size() != marks.points.size())
         return Error{"the marks have no names", path, "expected rows name,x,y,z"};
+    // A mark is found in the other file by its name.
+    for (std::size_t n = 0; n < marks.names.size(); ++n) {
+        if (marks.names[n].empty())
+            return Error{"mark " + std::to_string(n + 1) + " has no name", path,
+                         "give each mark a name of its own, the same in both files"};
+        if (std::find(marks.names.begin(), marks.names.begin() + static_cast<std::ptrdiff_t>(n),
+                      marks.names[n]) != marks.names.begin() + static_cast<std::ptrdiff_t>(n))
+            return Error{"two marks are named '" + marks.names[n] + "'", path,
+                         "give each mark a name of its own, the same in both files"};
+    }
     place_points(marks, 1, Axes::unsaid);
     return marks;
 }

@@ -16,6 +16,7 @@ struct JudgedPose {
     RigidQuadratic quadratic;
     // Root of the total cost: gaps, missing counterparts, deformation and hints.
     double score_mm = 0;
+    double skin_coverage = 0;  // share of the skin that has a counterpart
     double coverage = 0;
     double back_cost_mm2 = 0;  // the part of score_mm^2 for the open side of the sweep
 };
@@ -26,7 +27,10 @@ struct PoseChoice {
     bool open_side_dropped = false;    // the sweep is of a flank: the open side was not considered
     double mirror_score_mm = 0;        // of the mirrored surface
     double turned_score_mm = 0;        // of the best pose with the head away from `up`; 0: no `up`
-    std::string handedness;            // whether the skin tells right-handed axes from left-handed
+    double front_turned_score_mm = 0;  // of the pose turned front to back
+    std::string front;                 // whether the skin tells front from back
+    std::string head;  // whether the skin tells the given `up` from its opposite; empty: no `up`
+    std::string handedness;  // whether the skin tells right-handed axes from left-handed
     std::vector<std::string> warnings;
 };
 

@@ -38,16 +38,27 @@ void add_target(StageReport& report, const TargetSurface& t) {
 
 void add_organs(StageReport& report, const WarpFit& w) {
     MeasureGroup volume{"volume_change", {}}, shape{"shape_change", {}};
-    MeasureGroup median{"unknown_median_mm", {}}, p95{"unknown_p95_mm", {}};
+    MeasureGroup median{"unknown_median_mm", {}}, p90{"unknown_p90_mm", {}},
+        p95{"unknown_p95_mm", {}}, covariance{"unknown_p90_of_covariance_mm", {}},
+        refits{"unknown_p90_of_refits_mm", {}}, halves{"halves_p90_mm", {}},
+        held{"unknown_p90_with_two_landmarks_mm", {}};
     for (const OrganChange& c : w.organs) {
         volume.values.push_back({c.label, c.volume_ratio});
         shape.values.push_back({c.label, c.shape_change});
     }
     for (const OrganUnknown& u : w.unknown) {
         median.values.push_back({u.label, u.median_mm});
+        p90.values.push_back({u.label, u.p90_mm});
         p95.values.push_back({u.label, u.p95_mm});
+        covariance.values.push_back({u.label, u.covariance.p90_mm});
+        if (u.refits.p90_mm > 0) refits.values.push_back({u.label, u.refits.p90_mm});
+        if (u.halves_p90_mm > 0) halves.values.push_back({u.label, u.halves_p90_mm});
+        if (u.p90_with_landmarks_mm > 0) held.values.push_back({u.label, u.p90_with_landmarks_mm});
     }
-    report.groups = {std::move(volume), std::move(shape), std::move(median), std::move(p95)};
+    report.groups = {std::move(volume), std::move(shape), std::move(median), std::move(p90),
+                     std::move(p95)};
+    for (MeasureGroup* group : {&covariance, &refits, &halves, &held})
+        if (!group->values.empty()) report.groups.push_back(std::move(*group));
 }
 
 void warn_of_readings(StageReport& report, const FitContext& s, const FitMeasure& fit) {
@@ -118,6 +129,7 @@ StageReport align_report(const FitContext& s,
     report.measures.push_back({"pose_score_mm", choice.best.score_mm});
     report.measures.push_back({"mirror_score_mm", choice.mirror_score_mm});
     if (s.hints.up) report.measures.push_back({"head_turned_score_mm", choice.turned_score_mm});
+    report.measures.push_back({"front_turned_score_mm", choice.front_turned_score_mm});
     report.measures.push_back({"starts_at_pose", static_cast<double>(choice.best.rigid.found)});
     report.measures.push_back({"open_side_size", s.open_side.size});
     if (choice.open_side_dropped) {
@@ -127,7 +139,9 @@ StageReport align_report(const FitContext& s,
     } else {
         report.notes = {{"open_side", s.open_side_is}, {"open_side_reason", s.open_side_why}};
     }
+    if (!choice.head.empty()) report.notes.push_back({"head", choice.head});
     report.notes.push_back({"handedness", choice.handedness});
+    report.notes.push_back({"front", choice.front});
     if (!choice.runners_up.empty()) {
         const RunnerUp& r = choice.runners_up.front();
         report.measures.push_back({"runner_up_score_mm", r.score_mm});

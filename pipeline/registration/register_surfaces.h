@@ -7,9 +7,8 @@
 //   head the other way -> point-to-surface quadratic -> residual warp, or the elastic warp where
 //   bodies differ by more than that can close -> proofs, measures, warnings
 //
-// The seed turns the set of starts and draws the samples of the paper's random consensus, nothing
-// else: for 96 starts or more the map is the same within half a millimetre for any seed, save where
-// no quadratic explains the readings and the rigid pose stands (2 mm).
+// The seed draws the samples of the paper's random consensus, nothing else: the map is the same for
+// any seed and in any frame of the tracker.
 //
 // The data do not fully determine the orientation of a torso: upside-down and rolled fits score
 // within a few per cent. Candidates are compared after a quadratic, and points without a
@@ -38,7 +37,7 @@
 
 namespace sonocase::pipeline::inline registration {
 
-inline constexpr int kRegisterVersion = 5;
+inline constexpr int kRegisterVersion = 6;
 
 // The same point of the body on both surfaces, e.g. navel or crotch.
 struct Landmark {
@@ -56,7 +55,7 @@ struct RegisterInput {
 
 struct RegisterOptions {
     TargetOptions target;
-    RigidOptions rigid;       // `up` and `seed` here are overwritten by those below
+    RigidOptions rigid;       // `up` here is overwritten by that below
     RansacOptions ransac;     // of paper_warp alone
     bool paper_warp = false;  // RANSAC and re-estimation, eqs. (3)-(9), and nothing more
     // Weight of eqs. (4)-(6) in mm. 0: sqrt(2) e / strain with the standard error e of the gaps,
@@ -78,6 +77,10 @@ struct RegisterOptions {
     double landmark_mm = 4;  // of each landmark and axis, standard deviation, both sides together
     std::vector<Landmark> landmarks;
     std::uint64_t seed = 1;
+    // What the readings leave open, structure by structure, from refits to halves of the readings
+    // as well as from the fit's own covariance (fit_unknown.h); off: from the covariance alone.
+    std::string uncertainty = "off";  // "on"
+    int refits = 12;                  // >= 2
 };
 
 enum class PoseKind { shifted, tilted, rolled, upside_down };
@@ -90,12 +93,21 @@ struct RunnerUp {
     std::string described;  // "upside down", "front to back", ...
 };
 
-// How far from its true place a structure may lie on the mannequin, by what the readings leave
-// open: half of the maps that explain them as well carry it less than median_mm from here, and 95 %
-// less than p95_mm (root mean square over the structure).
-struct OrganUnknown {
+// Root mean square over a structure, mm: half, 90 % and 95 % of the maps that the readings allow
+// carry it less far from here.
+struct Spread {
+    double median_mm = 0, p90_mm = 0, p95_mm = 0;
+};
+
+// How far from its true place a structure may lie on the mannequin. Its own Spread is what is said:
+// the larger of the two.
+struct OrganUnknown : Spread {
     std::string label;
-    double median_mm = 0, p95_mm = 0;
+    Spread covariance;           // of the Gauss-Newton system
+    Spread refits;               // to halves of the readings; zero: not asked for
+    double halves_p90_mm = 0;    // nine in ten of the refits carry it less far; 0: not asked for
+    double beyond_rigid_mm = 0;  // what the map does beyond a rigid motion of the inside
+    double p90_with_landmarks_mm = 0;  // if two landmarks were given; 0: some are
 };
 
 struct RegisterResult {

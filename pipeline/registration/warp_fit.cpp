@@ -7,6 +7,7 @@
 
 #include "pipeline/base/text.h"
 #include "pipeline/registration/elastic/tissue_lattice.h"
+#include "pipeline/registration/fit_unknown.h"
 #include "pipeline/registration/map/map_proofs.h"
 
 namespace sonocase::pipeline::inline registration {
@@ -234,14 +235,9 @@ namespace {
 constexpr double kFirstConstraintMm = 30, kLighter = 3.2;
 constexpr int kMaxWeights = 6;
 
-// Landmarks are weighted by their evidence relative to that of the readings.
-double landmark_weight(const QuadraticTrust& trust, double landmark_mm) {
-    const double ratio = trust.standard_error_mm / std::max(landmark_mm, 0.1);
-    return std::clamp(ratio * ratio, 1e-5, 0.02);
-}
-
 struct Quadratic {
     RigidQuadratic map;
+    std::vector<RefineOptions> steps;
     double constraint_mm = 0, condition = 0;
     QuadraticTrust trust;
 };
@@ -267,6 +263,7 @@ Quadratic descend(const FitContext& s,
             refine_quadratic(s.fine, s.target, s.readings, best.map, refine);
         if (!(proven_min_det(refined.map, s.box) >= options.wanted_det)) break;
         best.map = refined.map;
+        best.steps.push_back(refine);
         best.constraint_mm = constraint;
         best.condition = refined.condition;
         best.trust = trust_quadratic(s.fine, s.target, s.readings, best.map, refine, options.strain,
@@ -290,90 +287,6 @@ double mean_move(const DisplacementGrid& field, Point3 origin, const std::vector
     double sum = 0;
     for (Point3 p : points) sum += norm(displacement(field, origin + (p - Point3{})));
     return points.empty() ? 0 : sum / static_cast<double>(points.size());
-}
-
-// What would be left open inside with two landmarks more, one near either end of the skin.
-double inside_with_landmarks(const FitContext& s,
-                             const Quadratic& fitted,
-                             const RegisterOptions& options) {
-    std::vector<Point3> inner;
-    for (std::size_t i = 0; i < s.fine.points.size(); ++i) {
-        if (!s.fine.on_rim[i]) inner.push_back(s.fine.points[i]);
-    }
-    if (inner.empty() || !(fitted.constraint_mm > 0)) return 0;
-    const auto [low, high] = std::minmax_element(inner.begin(), inner.end(),
-                                                 [](Point3 a, Point3 b) { return a.z < b.z; });
-    RefineOptions refine;
-    refine.constraint_mm = fitted.constraint_mm;
-    refine.landmarks = s.landmarks;
-    refine.landmark_weight = landmark_weight(fitted.trust, options.landmark_mm);
-    for (Point3 p : {*low, *high}) refine.landmarks.push_back({p, map_point(fitted.map, p)});
-    return trust_quadratic(s.fine, s.target, s.readings, fitted.map, refine, options.strain,
-                           s.inside)
-        .inside_mm;
-}
-
-constexpr std::size_t kPointsOfAnOrgan = 25;
-
-// Root mean square of the displacement beyond the quadratic. A body can be read either way, as a
-// quadratic or with the displacement, so that this is left open as well.
-double displaced_mm(const FitContext& s,
-                    const Registration& map,
-                    const std::vector<Point3>& points) {
-    if (map.residual.control_mm.empty() || points.empty()) return 0;
-    double sum = 0;
-    for (Point3 p : points) {
-        const Vector3 d = displacement(map.residual, s.fine.origin + (p - Point3{}));
-        sum += dot(d, d);
-    }
-    return std::sqrt(sum / static_cast<double>(points.size()));
-}
-
-// What the posterior of the quadratic and the displacement leave open, label by label.
-std::vector<OrganUnknown> unknown_of(const FitContext& s,
-                                     const RigidQuadratic& q,
-                                     const QuadraticTrust& trust,
-                                     const Registration& map) {
-    std::vector<OrganUnknown> unknown;
-    if (!s.labels || trust.draws.empty()) return unknown;
-    const Grid& grid = s.labels->grid;
-    std::vector<std::size_t> voxels(256, 0), seen(256, 0);
-    for (const std::uint8_t v : s.labels->voxels) ++voxels[v];
-    std::vector<std::vector<Point3>> points(s.labels->labels.size());
-    std::size_t n = 0;
-    for (int k = 0; k < grid.size.z; ++k) {
-        for (int j = 0; j < grid.size.y; ++j) {
-            for (int i = 0; i < grid.size.x; ++i, ++n) {
-                const std::uint8_t v = s.labels->voxels[n];
-                if (v == 0 || v >= points.size()) continue;
-                const std::size_t at = seen[v]++, stride = 1 + voxels[v] / kPointsOfAnOrgan;
-                if (at % stride != stride / 2) continue;
-                points[v].push_back(Point3{} + (grid.point_from_voxel({1.0 * i, 1.0 * j, 1.0 * k}) -
-                                                s.fine.origin));
-            }
-        }
-    }
-    for (std::size_t v = 1; v < points.size(); ++v) {
-        if (points[v].empty()) continue;
-        const double displaced = displaced_mm(s, map, points[v]);
-        std::vector<double> off;
-        for (RigidQuadratic draw : trust.draws) {
-            for (int d = 0; d < 3; ++d) {
-                for (int c = 0; c < 10; ++c) draw.k[d][c] -= q.k[d][c];
-            }
-            double sum = 0;
-            for (Point3 p : points[v]) {
-                const Vector3 d = map_point(draw, p) - Point3{};
-                sum += dot(d, d);
-            }
-            off.push_back(
-                std::hypot(std::sqrt(sum / static_cast<double>(points[v].size())), displaced));
-        }
-        std::sort(off.begin(), off.end());
-        unknown.push_back(
-            {s.labels->labels[v].name, off[off.size() / 2], off[off.size() * 95 / 100]});
-    }
-    return unknown;
 }
 
 }  // namespace
@@ -403,8 +316,8 @@ WarpFit fit_warp(const FitContext& s,
         w.kept_rigid =
             !(fitted.trust.patches > 0 && fitted.trust.held_out_mm < w.rigid_trust.fitted_mm);
         w.trust = fitted.trust;
+        w.steps = fitted.steps;
         judged = fitted.map;
-        if (s.landmarks.empty()) w.with_landmarks_mm = inside_with_landmarks(s, fitted, options);
         q = w.kept_rigid ? start : fitted.map;
         if (!w.kept_rigid) {
             w.constraint_mm = fitted.constraint_mm;
@@ -438,8 +351,7 @@ WarpFit fit_warp(const FitContext& s,
     w.sampled_det = proof.min_sample;
     w.fit = w.residual.used ? measure_fit(s.skin, s.target, w.registration) : w.quadratic_fit;
     choose_warp(s, options, progress, &w);
-    w.unknown = unknown_of(s, judged, w.trust, w.registration);
-    w.displaced_mm = displaced_mm(s, w.registration, s.inside);
+    find_unknown(s, rigid, judged, options, progress, &w);
     report_progress(progress, 0.95, "measuring");
     if (!(w.min_det > kMinDetJacobian)) {
         w.warnings.push_back(

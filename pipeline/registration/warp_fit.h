@@ -42,7 +42,8 @@ struct WarpFit {
     double displaced_mm = 0;       // inside, by what follows the quadratic; root mean square
     double with_landmarks_mm = 0;  // trust.inside_mm if two landmarks were given; 0: some are
     FitMeasure rigid_fit, quadratic_fit, fit;
-    double residual_mean_mm = 0;  // at the skin
+    double residual_mean_mm = 0;       // at the skin
+    std::vector<RefineOptions> steps;  // of the quadratic, to the map that was chosen
     std::vector<std::string> warnings;
 };
 

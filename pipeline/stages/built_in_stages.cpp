@@ -13,9 +13,11 @@ StageTable make_table() {
     table.common = OptionsOf<CaseOptions>("case").number(
         "seed", [](auto& o) { return &o.seed; }, 0, 2e9, "",
         "seed of everything random in the case");
-    table.presets = {{"draft", {{"resample.voxel_mm", "2"}, {"texture.edge", "32"}}},
-                     {"balanced", {{"resample.voxel_mm", "1"}}},
-                     {"accurate", {{"resample.voxel_mm", "0.75"}, {"surface.working_mm", "2"}}}};
+    table.presets = {
+        {"draft", {{"resample.voxel_mm", "2"}, {"texture.edge", "32"}}},
+        {"balanced", {{"resample.voxel_mm", "1"}, {"warp.uncertainty", "on"}}},
+        {"accurate",
+         {{"resample.voxel_mm", "0.75"}, {"surface.working_mm", "2"}, {"warp.uncertainty", "on"}}}};
     return table;
 }
 

@@ -225,6 +225,14 @@ Result<ImportedLabels> read_inputs(const Recipe& recipe,
 
 }  // namespace
 
+Result<Grid> mesh_inputs_grid(const Recipe& recipe) {
+    const RecipeInputs& in = recipe.inputs;
+    MeshOptions options = recipe.settings.of<MeshImportOptions>().mesh;
+    options.scale = in.labels_scale;
+    options.axes = axes_named(in.labels_axes);
+    return mesh_grid(recipe.resolve(in.labels), recipe.resolve(in.label_table), options);
+}
+
 Result<ImportedLabels> import_inputs(const Recipe& recipe,
                                      const MeshImportOptions& given,
                                      const Progress& progress) {
@@ -257,7 +265,11 @@ StageDescriptor import_stage() {
         return assign_tissues(recipe, labels);
     };
     stage.share = 0.03;
-    stage.cost = {.threads = 1, .base_mb = 240, .per_label_mb = 1.2, .per_label_voxel = 4};
+    stage.cost = {.threads = 1,
+                  .base_mb = 240,
+                  .per_label_mb = 1.2,
+                  .per_label_voxel = 4,
+                  .per_mesh_voxel = 18.5};
     stage.verb = verb();
     return stage;
 }

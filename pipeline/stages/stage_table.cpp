@@ -28,7 +28,8 @@ int StageCost::memory_mb(const CaseSize& size) const {
     return static_cast<int>(
         std::ceil(base_mb + std::max(apart_mb, per_label_mb * size.label_mb + voxels_mb +
                                                    per_cooked_voxel * size.cooked_voxels +
-                                                   per_region_voxel * size.region_voxels)));
+                                                   per_region_voxel * size.region_voxels +
+                                                   per_mesh_voxel * size.mesh_voxels)));
 }
 
 int StageCost::min_memory_mb(const CaseSize& size) const {

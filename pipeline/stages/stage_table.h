@@ -162,12 +162,14 @@ struct CaseSize {
     // Millions of nodes between thick slices that are interpolated; 0: none are.
     double interpolated_nodes = 0;
     double region_voxels = 0;  // millions
+    double mesh_voxels = 0;    // those of label_voxels that organ meshes become
 };
 
 // Cores that a stage's job asks a build farm for, and its peak memory in MB: base + a * MB of the
-// label file + b * million voxels of the label map + c * million cooked voxels + d * million voxels
-// of the region; for a stage that works through large maps piece by piece, the voxels count at most
-// large_mb + e * million voxels. docs/farm.md has the measurements.
+// label file + b * million voxels of the label map (+ b' where meshes become it) + c * million
+// cooked voxels + d * million voxels of the region; for a stage that works through large maps piece
+// by piece, the voxels count at most large_mb + e * million voxels. docs/farm.md has the
+// measurements.
 struct StageCost {
     int threads = 1;
     double base_mb = 240, per_label_mb = 0, per_label_voxel = 0, per_cooked_voxel = 0;
@@ -175,6 +177,7 @@ struct StageCost {
     double per_streamed_voxel = 0;  // in place of per_large_voxel where memory is short; 0: as that
     double per_interpolated_node = 0;  // beside base_mb and no other, up to ten million nodes
     double per_region_voxel = 0;
+    double per_mesh_voxel = 0;
 
     int memory_mb(const CaseSize& size) const;
     int min_memory_mb(const CaseSize& size) const;  // what suffices where memory is short

@@ -103,6 +103,16 @@ void add_residual(OptionsOf<Fit>& options) {
             "depth at which the residual has faded");
 }
 
+void add_uncertainty(OptionsOf<Fit>& options) {
+    options.help_group("What is not known")
+        .choice(
+            "uncertainty", [](auto& o) { return &o.uncertainty; }, {"on", "off"}, "",
+            "repeat the fit on halves of the readings, to tell what they leave open")
+        .number(
+            "refits", [](auto& o) { return &o.refits; }, 2, 200, "",
+            "fits to halves of the readings, where uncertainty is on");
+}
+
 void add_elastic(OptionsOf<Fit>& options) {
     options.help_group("Elastic warp")
         .number(
@@ -127,6 +137,7 @@ OptionGroup options() {
     add_quadratic(options);
     add_residual(options);
     add_elastic(options);
+    add_uncertainty(options);
     return options;
 }
 

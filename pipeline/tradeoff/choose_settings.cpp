@@ -27,13 +27,13 @@ double voxels(double volume_mm3, const Settings& settings) {
     return volume_mm3 / (h * h * h);
 }
 
-// The seconds of a row for a case of another volume. The part that does not depend on voxels stays.
-double seconds_at(const FrontRow& row,
-                  const FrontTable& table,
-                  const CostModel& model,
-                  double volume_mm3) {
-    const double more = voxels(volume_mm3, row.settings) - voxels(table.volume_mm3, row.settings);
-    return std::max(0.1 * row.seconds, row.seconds + model.per_voxel_s * more);
+constexpr double kSame = 0.01;  // errors that differ by less are one
+
+// Whether another row has less error in less time. A case is not tried with such settings.
+bool is_beaten(const FrontRow& row, const FrontTable& table) {
+    return std::any_of(table.rows.begin(), table.rows.end(), [&](const FrontRow& other) {
+        return other.error_mm < row.error_mm && other.seconds < row.seconds;
+    });
 }
 
 }  // namespace
@@ -114,72 +114,100 @@ double probe_seconds() {
 
 Choice choose_settings(const FrontTable& table,
                        const AccuracyTarget& target,
-                       const std::function<double(const Settings&)>& seconds_of) {
+                       const CaseFigures& figures) {
     assert(!table.rows.empty());
-    const auto seconds = [&](const FrontRow& row) { return seconds_of(row.settings); };
-    std::vector<FrontRow> rows = table.rows;
+    struct Row {
+        const Settings* settings;
+        double error_mm, seconds;
+    };
+    std::vector<Row> rows;  // the cheapest first
+    for (const FrontRow& row : table.rows)
+        if (!is_beaten(row, table))
+            rows.push_back(
+                {&row.settings, figures.error_mm(row.settings), figures.seconds(row.settings)});
     std::stable_sort(rows.begin(), rows.end(),
-                     [&](const FrontRow& a, const FrontRow& b) { return seconds(a) < seconds(b); });
-    const auto best = *std::min_element(
-        rows.begin(), rows.end(),
-        [](const FrontRow& a, const FrontRow& b) { return a.error_mm < b.error_mm; });
-    const FrontRow* chosen = nullptr;
+                     [](const Row& a, const Row& b) { return a.seconds < b.seconds; });
+    // The cheapest of the best among those that a budget allows.
+    const auto best_within = [&](double seconds) {
+        const Row* best = nullptr;
+        for (const Row& row : rows) {
+            if (row.seconds > seconds) break;
+            if (best == nullptr || row.error_mm < (1 - kSame) * best->error_mm) best = &row;
+        }
+        return best;
+    };
+    const Row* chosen = nullptr;
     Choice choice;
     if (target.tolerance_mm > 0) {
-        for (const FrontRow& row : rows) {
+        for (const Row& row : rows) {
             if (chosen == nullptr && row.error_mm <= target.tolerance_mm) chosen = &row;
         }
         if (chosen == nullptr) {
-            chosen = &best;
-            choice.warning =
-                "no setting measured comes within " + number_text(target.tolerance_mm, 3) +
-                " mm; the best, " + number_text(best.error_mm, 3) +
-                " mm, was taken (more readings of the mannequin and thinner CT slices lower it)";
+            chosen = best_within(HUGE_VAL);
+            choice.warning = "no setting brings this case within " +
+                             number_text(target.tolerance_mm, 3) + " mm; the best, " +
+                             number_text(chosen->error_mm, 3) + " mm, was taken";
         }
     } else {
-        for (const FrontRow& row : rows) {
-            if (seconds(row) > target.time_budget_s) continue;
-            if (chosen == nullptr || row.error_mm < chosen->error_mm) chosen = &row;
-        }
+        chosen = best_within(target.time_budget_s);
         if (chosen == nullptr) chosen = &rows.front();
     }
-    if (target.time_budget_s > 0 && seconds(*chosen) > target.time_budget_s) {
+    if (target.time_budget_s > 0 && chosen->seconds > target.time_budget_s) {
         choice.warning += (choice.warning.empty() ? "" : "; ") +
                           std::string("the settings chosen take about ") +
-                          number_text(seconds(*chosen), 2) + " s, more than the " +
+                          number_text(chosen->seconds, 2) + " s, more than the " +
                           number_text(target.time_budget_s, 3) + " s given";
     }
-    choice.settings = chosen->settings;
+    choice.settings = *chosen->settings;
     choice.predicted_error_mm = chosen->error_mm;
-    choice.predicted_seconds = seconds(*chosen);
+    choice.predicted_seconds = chosen->seconds;
     return choice;
 }
 
-NextStep next_step(const FrontTable& table, double voxel_mm, double volume_mm3) {
-    const CostModel model = fit_cost_model(table);
-    const auto seconds = [&](const FrontRow& row) {
-        return seconds_at(row, table, model, volume_mm3);
-    };
-    // The case was cooked with the cheapest of the rows with its voxel.
-    const FrontRow* now = nullptr;
-    for (const FrontRow& row : table.rows) {
-        const double off = std::abs(voxel_mm_of(row.settings) - voxel_mm);
-        const double best = now ? std::abs(voxel_mm_of(now->settings) - voxel_mm) : 1e300;
-        if (off < best || (off == best && seconds(row) < seconds(*now))) now = &row;
-    }
+NextStep next_step(const FrontTable& table,
+                   std::span<const StageReport> stages,
+                   double volume_mm3) {
+    const double now_mm = error_budget(stages).known_mm;
     NextStep step;
-    if (now == nullptr) return step;
-    const FrontRow* next = nullptr;
-    for (const FrontRow& row : table.rows) {
-        if (row.error_mm >= now->error_mm * 0.99)
-            continue;  // less than a hundredth is not worth a step
-        if (next == nullptr || seconds(row) < seconds(*next)) next = &row;
+    step.error_from_mm = now_mm;
+    // The same case with one measure changed; NaN where it has none of that name.
+    const auto changed = [&](const char* stage, const char* measure, double value) {
+        std::vector<StageReport> other(stages.begin(), stages.end());
+        bool found = false;
+        for (StageReport& report : other)
+            for (Measure& m : report.measures) {
+                if (report.stage != stage || m.name != measure) continue;
+                m.value = value;
+                found = true;
+            }
+        return found ? error_budget(other).known_mm : NAN;
+    };
+    const auto measure = [&](const char* stage, const char* name) {
+        for (const StageReport& report : stages)
+            for (const Measure& m : report.measures)
+                if (report.stage == stage && m.name == name) return m.value;
+        return 0.0;
+    };
+    const double held = measure(stage_names::kWarp, "interior_with_two_landmarks_mm");
+    if (held > 0) {
+        step.error_to_mm = changed(stage_names::kWarp, "predicted_interior_mm", held);
+        step.step = "two landmarks far apart (--landmarks FILE.csv)";
+        if (step.error_to_mm < (1 - kSame) * now_mm) return step;
     }
-    if (next == nullptr) return step;
-    step.settings = settings_text(next->settings);
-    step.error_from_mm = now->error_mm;
-    step.error_to_mm = next->error_mm;
-    step.more_seconds = seconds(*next) - seconds(*now);
+    const double voxel_mm = measure(stage_names::kResample, "voxel_mm");
+    double next_mm = 0;
+    for (const FrontRow& row : table.rows) {
+        const double finer = voxel_mm_of(row.settings);
+        if (finer < voxel_mm && finer > next_mm &&
+            changed(stage_names::kResample, "voxel_mm", finer) < (1 - kSame) * now_mm)
+            next_mm = finer;
+    }
+    if (!(next_mm > 0)) return {};
+    const auto voxels_of = [&](double h) { return volume_mm3 / (h * h * h); };
+    step.step = "resample.voxel_mm=" + number_text(next_mm, 3);
+    step.error_to_mm = changed(stage_names::kResample, "voxel_mm", next_mm);
+    step.more_seconds =
+        fit_cost_model(table).per_voxel_s * (voxels_of(next_mm) - voxels_of(voxel_mm));
     return step;
 }
 

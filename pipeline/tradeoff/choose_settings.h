@@ -2,14 +2,15 @@
 
 // Chooses settings for a wanted accuracy, or for the time available.
 //
-// The error is taken from the table of measured settings (measured_front.inc, written by
-// scripts/accuracy from a sweep of the whole case on the synthetic bodies): the largest over these
-// bodies. The caller gives the seconds of the case at hand. The seconds of the next step in a
-// bundle must not depend on the machine: they are those of the sweep, scaled to the case's volume
-// by a cost per voxel that is fitted to the table.
+// The settings to choose from are those of the table (measured_front.inc, written by
+// scripts/accuracy from a sweep of the whole case on the synthetic bodies). Error and seconds are
+// those of the case at hand, which the caller gives. The seconds of the next step in a bundle must
+// not depend on the machine: they are those of the sweep, by a cost per voxel that is fitted to the
+// table.
 #pragma once
 
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -63,14 +64,21 @@ struct Choice {
     std::string warning;  // the part of the target that cannot be achieved; empty: none
 };
 
-// seconds: the time of the whole command for the case at hand with given settings
-// (pipeline/cook/case_cost.h). The table has at least one row.
+// What the case at hand has with given settings.
+struct CaseFigures {
+    std::function<double(const Settings&)> error_mm;
+    std::function<double(const Settings&)> seconds;  // of the whole command
+};
+
+// Errors that differ by less than a hundredth count as one: of those the cheapest is taken. The
+// table has at least one row.
 Choice choose_settings(const FrontTable& table,
                        const AccuracyTarget& target,
-                       const std::function<double(const Settings&)>& seconds);
+                       const CaseFigures& figures);
 
-// The next step to a lower error: the cheapest row that is better than the one with which a case
-// was cooked, which is found by its voxel.
-NextStep next_step(const FrontTable& table, double voxel_mm, double volume_mm3);
+// What would lower the error of a case by a hundredth or more, by its own reports: two landmarks,
+// where its fit has none and says what they would bring; otherwise the largest voxel of the table
+// that does. volume_mm3  of its grid
+NextStep next_step(const FrontTable& table, std::span<const StageReport> stages, double volume_mm3);
 
 }  // namespace sonocase::pipeline::inline tradeoff

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -18,8 +19,10 @@
 #include "formats/files/thread_jobs.h"
 #include "pipeline/base/memory_limit.h"
 #include "pipeline/base/parallel.h"
+#include "pipeline/base/text.h"
 #include "pipeline/cook/case_cost.h"
 #include "pipeline/cook/cook_case.h"
+#include "pipeline/export/error_budget.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "pipeline/stages/read_recipe.h"
 #include "pipeline/tradeoff/boundary_error.h"
@@ -68,18 +71,86 @@ StageReport with_cache_notes(const StageRun& run) {
     return report;
 }
 
-// Puts settings for the accuracy or the time that was asked for into the recipe.
+// What the stages of a case report up to its fit, with the settings of `recipe`. Everything that is
+// made stays in the cache, where the build finds it.
+Result<std::vector<StageReport>> fit_reports(const BuildOptions& options, const Recipe& recipe) {
+    std::vector<StageReport> reports;
+    for (const char* until : {stage_names::kImport, stage_names::kWarp}) {
+        CookOptions cook;
+        cook.cache_folder = options.cache;
+        cook.cache_bytes = static_cast<std::uint64_t>(options.cache_limit_mb * 1e6);
+        cook.producer = producer();
+        cook.until = until;
+        ProgressBar bar(options.common);
+        SONOCASE_TRY(const auto made, cook_case(recipe, cook, bar.progress()));
+        for (const StageRun& run : made.stages) reports.push_back(run.report);
+    }
+    return reports;
+}
+
+// The budget of a case that has been fitted and is then cooked with a voxel.
+ErrorBudget budget_at(std::vector<StageReport> reports, double voxel_mm) {
+    StageReport resample;
+    resample.stage = stage_names::kResample;
+    resample.measures = {{"voxel_mm", voxel_mm}};
+    reports.push_back(resample);
+    return error_budget(reports);
+}
+
+// The largest part of an error, in words; empty: there is none.
+std::string largest_part(const ErrorBudget& budget) {
+    const BudgetEntry* largest = nullptr;
+    for (const BudgetEntry& e : budget.entries)
+        if (std::isfinite(e.mm) && (largest == nullptr || e.mm > largest->mm)) largest = &e;
+    return largest == nullptr
+               ? ""
+               : text("most of it, %.2g mm, is that of %s", largest->mm, largest->cause.c_str());
+}
+
+// Puts settings for the accuracy or the time that was asked for into the recipe. The case is fitted
+// for it, once for each of the fits that the settings ask for.
 Result<Choice> choose_for(const BuildOptions& options, Recipe& recipe, double speed) {
     if (auto size = cooked_volume_mm3(recipe); !size) return size.error();
     const CaseSize size = case_size(recipe);
     const double voxel_mm = recipe.settings.of<ResampleOptions>().voxel_mm;
     Recipe tried = recipe;
-    const auto seconds = [&](const Settings& settings) {
+    const auto set = [&](const Settings& settings) {
         tried.settings = recipe.settings;
-        if (!apply_settings(settings, tried.settings)) return HUGE_VAL;
+        return apply_settings(settings, tried.settings).has_value();
+    };
+    CaseFigures figures;
+    figures.seconds = [&](const Settings& settings) {
+        if (!set(settings)) return HUGE_VAL;
         return build_time(tried, size, voxel_mm, speed, options.common.threads).alone_s;
     };
-    Choice choice = choose_settings(measured_front(), options.target, seconds);
+    std::optional<Error> error;
+    std::vector<std::string> advice;
+    std::map<std::string, std::vector<StageReport>> fits;  // by what of the settings they depend on
+    figures.error_mm = [&](const Settings& settings) {
+        if (error || !set(settings)) return HUGE_VAL;
+        std::string of_fit;
+        for (const Setting& s : settings)
+            if (!s.key.starts_with("resample.") && !s.key.starts_with("texture."))
+                of_fit += s.key + "=" + s.value + " ";
+        if (!fits.contains(of_fit)) {
+            auto reports = fit_reports(options, tried);
+            if (!reports) {
+                error = reports.error();
+                return HUGE_VAL;
+            }
+            fits[of_fit] = std::move(*reports);
+        }
+        const ErrorBudget budget =
+            budget_at(fits[of_fit], tried.settings.of<ResampleOptions>().voxel_mm);
+        advice = {largest_part(budget), landmark_advice(unknown_places(fits[of_fit]))};
+        return budget.known_mm;
+    };
+    Choice choice = choose_settings(measured_front(), options.target, figures);
+    if (error) return *error;
+    (void)figures.error_mm(choice.settings);
+    if (!choice.warning.empty() && options.target.tolerance_mm > 0)
+        for (const std::string& words : advice)
+            if (!words.empty()) choice.warning += "; " + words;
     if (const Status s = apply_settings(choice.settings, recipe.settings); !s) return s.error();
     return choice;
 }
@@ -98,6 +169,34 @@ struct Expected {
     bool said = false;
 };
 
+// What became of the accuracy or the time that was asked for.
+struct Achieved {
+    double known_mm = 0;            // by the reports of the stages
+    std::optional<double> true_mm;  // of the surfaces, where the truth is known
+    std::string missed;             // empty: nothing
+};
+
+Achieved achieved_by(const AccuracyTarget& target,
+                     const CookResult& cooked,
+                     const Recipe& recipe,
+                     double seconds) {
+    Achieved achieved;
+    std::vector<StageReport> reports;
+    for (const StageRun& run : cooked.stages) reports.push_back(run.report);
+    const ErrorBudget budget = error_budget(reports);
+    achieved.known_mm = budget.known_mm;
+    if (recipe.inputs.analytic)
+        achieved.true_mm = measure_boundary_error(cooked.bundle, recipe.inputs.torso).displaced_mm;
+    const double error_mm = std::max(achieved.known_mm, achieved.true_mm.value_or(0));
+    if (target.tolerance_mm > 0 && error_mm > target.tolerance_mm)
+        achieved.missed = text("asked for %.2g mm, came to %.2g mm; %s", target.tolerance_mm,
+                               error_mm, largest_part(budget).c_str());
+    if (target.time_budget_s > 0 && seconds > target.time_budget_s)
+        achieved.missed += (achieved.missed.empty() ? "" : "; ") +
+                           text("asked for %.2g s, took %.2g s", target.time_budget_s, seconds);
+    return achieved;
+}
+
 // Returns what a build reports: the stages as they ran, and which of them came from the cache.
 std::string build_report(const CookResult& cooked,
                          const std::string& out,
@@ -106,7 +205,7 @@ std::string build_report(const CookResult& cooked,
                          double seconds,
                          const Expected& expected,
                          const std::optional<Choice>& choice,
-                         const std::optional<double>& achieved_error_mm) {
+                         const Achieved& achieved) {
     nlohmann::ordered_json json;
     if (!out.empty()) json["bundle"] = out;
     json["digest"] = digest;
@@ -124,8 +223,10 @@ std::string build_report(const CookResult& cooked,
         json["choice"] = {{"settings", settings_text(choice->settings)},
                           {"predicted_error_mm", choice->predicted_error_mm},
                           {"predicted_seconds", choice->predicted_seconds},
-                          {"achieved_seconds", seconds}};
-        if (achieved_error_mm) json["choice"]["achieved_error_mm"] = *achieved_error_mm;
+                          {"achieved_seconds", seconds},
+                          {"known_error_mm", achieved.known_mm}};
+        if (achieved.true_mm) json["choice"]["achieved_error_mm"] = *achieved.true_mm;
+        if (!achieved.missed.empty()) json["choice"]["missed"] = achieved.missed;
     }
     json["stages"] = nlohmann::ordered_json::array();
     json["warnings"] = nlohmann::ordered_json::array();
@@ -147,8 +248,9 @@ Result<std::optional<Choice>> choose(const BuildOptions& options, Recipe& recipe
     if (target.tolerance_mm <= 0 && target.time_budget_s <= 0) return std::optional<Choice>();
     auto choice = choose_for(options, recipe, speed);
     if (!choice) return choice.error();
-    std::printf("chosen: %s, about %.2g mm in %.2g s\n", settings_text(choice->settings).c_str(),
-                choice->predicted_error_mm, choice->predicted_seconds);
+    std::printf("chosen: %s, this case's error about %.2g mm, in %.2g s\n",
+                settings_text(choice->settings).c_str(), choice->predicted_error_mm,
+                choice->predicted_seconds);
     if (!choice->warning.empty())
         std::fprintf(stderr, "sonocase build: warning: %s\n", choice->warning.c_str());
     return std::optional<Choice>(std::move(*choice));
@@ -171,9 +273,8 @@ Status write_stage_report(const BuildOptions& options,
                           const std::optional<Choice>& choice,
                           double seconds) {
     if (options.common.report_path.empty()) return Done{};
-    return write_file(
-        options.common.report_path,
-        build_report(cooked, "", cooked.digest, 0, seconds, expected, choice, std::nullopt));
+    return write_file(options.common.report_path,
+                      build_report(cooked, "", cooked.digest, 0, seconds, expected, choice, {}));
 }
 
 // Writes the bundle, its picture, and the report beside it, which inspect reads: seconds are not
@@ -190,6 +291,17 @@ Status write_case(const BuildOptions& options,
     for (const std::string& path : {out + ".report.json", options.common.report_path})
         if (!path.empty())
             if (auto status = write_file(path, report); !status) return status;
+    return Done{};
+}
+
+// A cache for this run alone where none was given: what is made to choose settings, or for the
+// first of several mannequins, is not made twice.
+Status open_own_cache(BuildOptions& options, const std::string& out) {
+    if (!options.cache.empty()) return Done{};
+    options.cache = out + ".cache-" + std::to_string(getpid());
+    std::error_code code;
+    std::filesystem::create_directories(options.cache, code);
+    if (code) return Error{"folder cannot be made", options.cache, code.message()};
     return Done{};
 }
 
@@ -225,20 +337,22 @@ int build_one(const BuildOptions& options) {
                     watch.seconds());
         return kDone;
     }
-    // Only the analytic torso's truth is known.
-    std::optional<double> achieved_error_mm;
-    if (*choice && recipe->inputs.analytic)
-        achieved_error_mm =
-            measure_boundary_error(cooked->bundle, recipe->inputs.torso).displaced_mm;
     const std::string out = options.out.empty() ? recipe->name + ".sonocase" : options.out;
     ThreadJobs jobs;
     const std::vector<std::uint8_t> bytes = write_bundle(cooked->bundle, jobs);
-    const std::string report = build_report(*cooked, out, digest_of(bytes), bytes.size(),
-                                            watch.seconds(), expected, *choice, achieved_error_mm);
+    const double seconds = watch.seconds();
+    Achieved achieved;
+    if (*choice) achieved = achieved_by(options.target, *cooked, *recipe, seconds);
+    const std::string report = build_report(*cooked, out, digest_of(bytes), bytes.size(), seconds,
+                                            expected, *choice, achieved);
     if (auto status = write_case(options, out, *cooked, bytes, report); !status)
         return fail("build", status.error());
     for (const StageRun& run : cooked->stages) {
         print_notes("build", run.report);
+        for (const Note& note : run.report.notes)
+            if (is_untold(note))
+                std::fprintf(stderr, "sonocase build: %s: %s\n", note.name.c_str(),
+                             note.text.c_str());
         print_warnings("build", with_cache_notes(run));
     }
     const Grid& grid = cooked->bundle.grid;
@@ -276,12 +390,7 @@ int build_several(const BuildOptions& options) {
     if (!recipe) return fail("build", recipe.error());
     const std::string out = options.out.empty() ? recipe->name + ".sonocase" : options.out;
     BuildOptions one = options;
-    std::error_code code;
-    if (one.cache.empty()) {
-        one.cache = out + ".cache-" + std::to_string(getpid());
-        fs::create_directories(one.cache, code);
-        if (code) return fail("build", Error{"folder cannot be made", one.cache, code.message()});
-    }
+    if (const Status s = open_own_cache(one, out); !s) return fail("build", s.error());
     int worst = kDone;
     for (std::size_t n = 0; n < stems.size(); ++n) {
         one.overrides.surface = options.surfaces[n];
@@ -291,6 +400,7 @@ int build_several(const BuildOptions& options) {
             one.common.report_path = with_stem(options.common.report_path, stems[n]);
         worst = std::max(worst, build_one(one));
     }
+    std::error_code code;
     if (options.cache.empty()) fs::remove_all(one.cache, code);
     return worst;
 }
@@ -300,7 +410,15 @@ int build(BuildOptions& options) {
     const MemoryLimit memory(options.memory_mb);
     if (options.surfaces.size() > 1) return build_several(options);
     if (options.surfaces.size() == 1) options.overrides.surface = options.surfaces[0];
-    return build_one(options);
+    if (options.target.tolerance_mm <= 0 && options.target.time_budget_s <= 0)
+        return build_one(options);
+    BuildOptions one = options;
+    const std::string beside = options.out.empty() ? "sonocase" : options.out;
+    if (const Status s = open_own_cache(one, beside); !s) return fail("build", s.error());
+    const int status = build_one(one);
+    std::error_code code;
+    if (options.cache.empty()) std::filesystem::remove_all(one.cache, code);
+    return status;
 }
 
 }  // namespace
@@ -350,7 +468,7 @@ int verb_build(int argc, char** argv) {
                    "Fail if recipe and inputs are not those of this key from plan.json")
         ->type_name("KEY");
     app.add_option("--tolerance-mm", options.target.tolerance_mm,
-                   "Take the cheapest settings whose measured error is within X")
+                   "Take the cheapest settings with which this case's own error is within X")
         ->check(CLI::PositiveNumber)
         ->type_name("X");
     app.add_option("--time-budget-s", options.target.time_budget_s,

@@ -86,6 +86,10 @@ int verb_publish(int argc, char** argv) {
     app.add_option("--xapi", options.xapi,
                    "Learning record store that takes the results; the page says so")
         ->type_name("ENDPOINT");
+    app.add_option("--xapi-key", options.xapi_key,
+                   "Key of that store, which everyone who opens the site can read: one that may "
+                   "only add statements. Default: that of the learning platform's launch")
+        ->type_name("USER:SECRET");
     app.add_option("--poses", options.poses,
                    "Pose server (sonoplay --serve-poses) that the page may connect to with ?poses=")
         ->type_name("ws://HOST:PORT");

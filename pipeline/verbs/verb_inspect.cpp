@@ -35,7 +35,7 @@ int verb_inspect(int argc, char** argv) {
     inspection.seconds = recorded_seconds(*bundle, path, inspection.digest);
     const Vector3 extent = bundle->grid.bounds().extent();
     inspection.next =
-        next_step(measured_front(), bundle->grid.spacing_mm.x, extent.x * extent.y * extent.z);
+        next_step(measured_front(), bundle->manifest.stages, extent.x * extent.y * extent.z);
     const std::string text =
         json ? inspection_json(*bundle, inspection) : inspection_text(*bundle, inspection);
     std::fputs(text.c_str(), stdout);

@@ -291,9 +291,15 @@ void print_fit(const RegisterResult& result) {
     if (!result.unknown.empty()) {
         const auto worst = std::max_element(
             result.unknown.begin(), result.unknown.end(),
-            [](const OrganUnknown& a, const OrganUnknown& b) { return a.p95_mm < b.p95_mm; });
-        std::printf("left open inside: at worst %s, %.1f mm (median), %.1f mm (95 %%)\n",
-                    worst->label.c_str(), worst->median_mm, worst->p95_mm);
+            [](const OrganUnknown& a, const OrganUnknown& b) { return a.p90_mm < b.p90_mm; });
+        std::printf(
+            "left open inside: at worst %s, %.1f mm (median), %.1f mm (90 %%), %.1f mm (95 %%)\n",
+            worst->label.c_str(), worst->median_mm, worst->p90_mm, worst->p95_mm);
+        if (worst->p90_with_landmarks_mm > 0 && worst->p90_with_landmarks_mm < worst->p90_mm)
+            std::printf(
+                "two landmarks, one at either end of the body, would bring %s from %.1f to "
+                "%.1f mm (90 %%)\n",
+                worst->label.c_str(), worst->p90_mm, worst->p90_with_landmarks_mm);
     }
     const double with = measure_of(result.report, "interior_with_two_landmarks_mm");
     if (with > 0)
@@ -302,7 +308,9 @@ void print_fit(const RegisterResult& result) {
             "(root mean square) of %.1f\n",
             with, measure_of(result.report, "predicted_interior_mm"));
     for (const Note& note : result.report.notes) {
+        if (note.name == "head") std::printf("head and feet: %s\n", note.text.c_str());
         if (note.name == "handedness") std::printf("right and left: %s\n", note.text.c_str());
+        if (note.name == "front") std::printf("front and back: %s\n", note.text.c_str());
     }
 }
 

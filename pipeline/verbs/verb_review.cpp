@@ -2,6 +2,7 @@
 
 // sonocase review, score and progress: pages, scores and results of recorded sessions.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 
@@ -235,7 +236,11 @@ int verb_progress(int argc, char** argv) {
     if (!csv.empty()) {
         const auto text = book->csv(trainee, exercise);
         if (!text) return fail("progress", text.error());
-        if (auto s = write_file(csv, *text); !s) return fail("progress", s.error());
+        // Spreadsheets take a table for Latin-1 unless it begins with the mark of UTF-8.
+        const bool ascii = std::all_of(text->begin(), text->end(),
+                                       [](char c) { return static_cast<unsigned char>(c) < 128; });
+        if (auto s = write_file(csv, (ascii ? "" : "\xEF\xBB\xBF") + *text); !s)
+            return fail("progress", s.error());
         return kDone;
     }
     const auto sessions = book->sessions(trainee, exercise);

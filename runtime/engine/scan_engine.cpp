@@ -47,14 +47,32 @@ bool another_moved(const TrackerReading& reading, const TrackerReading& before, 
 
 }  // namespace
 
+SensorAssignment places_of(const TrackerReading& reading, const SensorAssignment& assignment) {
+    return reading.in_mannequin || reading.placed ? SensorAssignment{} : assignment;
+}
+
+std::optional<Rigid> sensor_pose(const TrackerReading& reading,
+                                 const SensorAssignment& assignment,
+                                 int index) {
+    constexpr double kReferenceS = 0.25;  // as long as a tool may be silent
+    const SensorReading* s = sensor(reading, index);
+    if (!s) return {};
+    if (assignment.reference < 0 || reading.in_mannequin || s->in_mannequin || s->in_reference)
+        return s->world_from_sensor;
+    const SensorReading* reference = sensor(reading, assignment.reference);
+    if (!reference) return {};
+    if (reference->time_s >= 0 && reading.time_s - reference->time_s > kReferenceS) return {};
+    return inverse(reference->world_from_sensor) * s->world_from_sensor;
+}
+
 ToolPoses tool_poses(const TrackerReading& reading,
                      const Calibrations& calibrations,
                      const SensorAssignment& assignment) {
-    // Scripts and the mouse deliver tools rather than sensors, always at the default indices.
-    const SensorAssignment places = reading.in_mannequin ? SensorAssignment{} : assignment;
-    const auto place = [&](const SensorReading& s, const std::optional<Calibration>& tool) {
-        if (reading.in_mannequin || s.in_mannequin) return s.world_from_sensor;
-        Rigid world_from_tool = s.world_from_sensor;
+    const SensorAssignment places = places_of(reading, assignment);
+    const auto place = [&](const Rigid& world_from_sensor, bool in_mannequin,
+                           const std::optional<Calibration>& tool) {
+        if (reading.in_mannequin || in_mannequin) return world_from_sensor;
+        Rigid world_from_tool = world_from_sensor;
         if (tool) world_from_tool = world_from_tool * tool->sensor_from_tool;
         if (!calibrations.mannequin) return world_from_tool;
         Rigid pose = inverse(calibrations.mannequin->sensor_from_tool) * world_from_tool;
@@ -64,13 +82,15 @@ ToolPoses tool_poses(const TrackerReading& reading,
         return pose;
     };
     ToolPoses tools;
-    if (const SensorReading* s = sensor(reading, places.probe)) {
+    if (const auto pose = sensor_pose(reading, places, places.probe)) {
         tools.has_probe = true;
-        tools.mannequin_from_probe = place(*s, calibrations.probe);
+        tools.mannequin_from_probe =
+            place(*pose, reading.sensors[places.probe].in_mannequin, calibrations.probe);
     }
-    if (const SensorReading* s = sensor(reading, places.needle)) {
+    if (const auto pose = sensor_pose(reading, places, places.needle)) {
         tools.has_needle = true;
-        tools.mannequin_from_needle = place(*s, calibrations.needle);
+        tools.mannequin_from_needle =
+            place(*pose, reading.sensors[places.needle].in_mannequin, calibrations.needle);
     }
     return tools;
 }
@@ -104,7 +124,7 @@ Result<ScanEngine> ScanEngine::create(CaseView bundle,
 
 void ScanEngine::observe(const TrackerReading& given, bool is_device) {
     TrackerReading reading = given;
-    const SensorAssignment places = reading.in_mannequin ? SensorAssignment{} : assignment_;
+    const SensorAssignment places = places_of(reading, assignment_);
     const auto feed = [&](SensorWatch& watch, int index) {
         const bool present = index >= 0 && index < reading.sensor_count && index < kMaxSensors;
         if (!present) return watch.observe({}, reading.time_s, is_device);
@@ -115,6 +135,8 @@ void ScanEngine::observe(const TrackerReading& given, bool is_device) {
     };
     feed(probe_watch_, places.probe);
     feed(needle_watch_, places.needle);
+    // Each sensor by itself: relative to a reference that moves, a pose that is repeated changes.
+    if (places.reference >= 0) feed(reference_watch_, places.reference);
     force_watch_.observe(reading.force_n, reading.time_s);
     if (reading.restarts) {
         procedure_.begin();
@@ -127,12 +149,14 @@ void ScanEngine::observe(const TrackerReading& given, bool is_device) {
     // Readings in `mannequin` of no device (scripts, the mouse, sessions recorded here) were
     // checked where they were made: holding them back a second time would make a replay differ.
     const bool checked = reading.in_mannequin && !is_device;
+    const bool moved_away = places.reference >= 0 && reference_watch_.hold();
+    const bool hold_probe = !checked && (moved_away || probe_watch_.hold());
+    const bool hold_needle = !checked && (moved_away || needle_watch_.hold());
     // A lost probe keeps its last place, so that the picture freezes rather than flickers.
-    if (!checked && probe_watch_.hold()) tools.has_probe = tools_.has_probe;
-    if (!tools.has_probe || (!checked && probe_watch_.hold()))
-        tools.mannequin_from_probe = tools_.mannequin_from_probe;
-    if (!checked && needle_watch_.hold()) tools.has_needle = tools_.has_needle;
-    if (!tools.has_needle || (!checked && needle_watch_.hold()))
+    if (hold_probe) tools.has_probe = tools_.has_probe;
+    if (!tools.has_probe || hold_probe) tools.mannequin_from_probe = tools_.mannequin_from_probe;
+    if (hold_needle) tools.has_needle = tools_.has_needle;
+    if (!tools.has_needle || hold_needle)
         tools.mannequin_from_needle = tools_.mannequin_from_needle;
     tools_ = tools;
 }
@@ -162,8 +186,15 @@ FrameStatus ScanEngine::frame(double now_s,
     FrameRecord record;
     ToolPoses& tools = record.tools;
     tools = tools_;
-    if (probe_watch_.lost(now_s)) tools.has_probe = false;
-    if (needle_watch_.lost(now_s)) tools.has_needle = false;
+    const SensorAssignment places = places_of(reading_, assignment_);
+    const auto lost = [&](const SensorWatch& watch, int index) {
+        // Only a tool whose pose depends on the reference is lost with it.
+        const SensorReading* s = sensor(reading_, index);
+        const bool depends = places.reference >= 0 && s && !s->in_mannequin && !s->in_reference;
+        return watch.lost(now_s) || (depends && reference_watch_.lost(now_s));
+    };
+    if (lost(probe_watch_, places.probe)) tools.has_probe = false;
+    if (lost(needle_watch_, places.needle)) tools.has_needle = false;
     tools.probe_age_s = probe_watch_.age_s(now_s);
     tools.needle_age_s = needle_watch_.age_s(now_s);
     record.reading_time_s = reading_.time_s;
@@ -243,6 +274,7 @@ void ScanEngine::take_over(const ScanEngine& before) {
     sensed_press_mm_ = before.sensed_press_mm_;
     probe_watch_ = before.probe_watch_;
     needle_watch_ = before.needle_watch_;
+    reference_watch_ = before.reference_watch_;
     reading_ = before.reading_;
     tools_ = before.tools_;
     last_ = before.last_;

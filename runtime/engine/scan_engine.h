@@ -33,12 +33,18 @@ struct Calibrations {
     double needle_lag_s = 0;  // how much later the needle's readings come than the probe's
 };
 
-// Which sensor is on which tool; -1: none.
+// Which sensor is on which tool; -1: none. A reference is fixed to the mannequin: with one, probe
+// and needle are taken relative to it, so that the mannequin may be moved.
 struct SensorAssignment {
     int probe = kProbeSensor;
     int needle = kNeedleSensor;
+    int reference = -1;
     friend bool operator==(const SensorAssignment&, const SensorAssignment&) = default;
 };
+
+// The assignment that holds for a reading: scripts, the mouse and recordings deliver tools rather
+// than sensors, at the default indices.
+SensorAssignment places_of(const TrackerReading& reading, const SensorAssignment& assignment);
 
 // The tools of a reading, in the frame `mannequin`.
 struct ToolPoses {
@@ -50,8 +56,16 @@ struct ToolPoses {
     double probe_age_s = 0, needle_age_s = 0;
 };
 
-// Applies sensor_from_tool and world_from_mannequin (with its scale). A sensor that is absent or
-// lost, or whose pose is not a number, yields no tool. Constant time.
+// The pose of a sensor as calibrations mean it: relative to the reference where there is one,
+// unless the sensor's own pose is in `mannequin`. Nothing for a sensor that is absent or lost,
+// whose pose is not a number, or whose reference is so or came more than 0.25 s before. Constant
+// time.
+std::optional<Rigid> sensor_pose(const TrackerReading& reading,
+                                 const SensorAssignment& assignment,
+                                 int index);
+
+// Applies the reference, sensor_from_tool and world_from_mannequin (with its scale). A sensor that
+// is absent or lost, or whose pose is not a number, yields no tool. Constant time.
 ToolPoses tool_poses(const TrackerReading& reading,
                      const Calibrations& calibrations,
                      const SensorAssignment& assignment);
@@ -94,7 +108,8 @@ class ScanEngine {
 
     // Takes a new reading; the next frame shows it. A tool is lost, in the picture, the recording
     // and the scores, once its own sensor has no pose to be believed (SensorWatch::lost), whatever
-    // the others say; so is one at exactly the identity among others, which senders give for none.
+    // the others say, and both are with the reference; so is one at exactly the identity among
+    // others, which senders give for none.
     void observe(const TrackerReading& reading, bool is_device);
     // An act of the exercise's procedure, for the next frame; at most four come into one frame, the
     // rest into those after it. False: dozens of them wait already.
@@ -113,12 +128,18 @@ class ScanEngine {
     FrameStatus frame_again(const FrameRecord& record, std::span<std::uint8_t> pixels);
 
     void set_calibrations(const Calibrations& calibrations) { calibrations_ = calibrations; }
-    void set_assignment(const SensorAssignment& assignment) { assignment_ = assignment; }
+    void set_assignment(const SensorAssignment& assignment) {
+        // What was seen of a reference says nothing once there is another or none.
+        if (assignment.reference != assignment_.reference) reference_watch_ = SensorWatch();
+        assignment_ = assignment;
+    }
 
     const FrameRecord& last() const { return last_; }
     std::shared_ptr<const Anatomy> anatomy() const { return anatomy_; }
     SensorVerdict probe_verdict(double now_s) const { return probe_watch_.verdict(now_s); }
     SensorVerdict needle_verdict(double now_s) const { return needle_watch_.verdict(now_s); }
+    // absent: no reference is in use.
+    SensorVerdict reference_verdict(double now_s) const { return reference_watch_.verdict(now_s); }
     // Of the pose last believed (SensorWatch::age_s()).
     double needle_age_s(double now_s) const { return needle_watch_.age_s(now_s); }
     int jumps() const { return probe_watch_.jumps() + needle_watch_.jumps(); }
@@ -163,7 +184,7 @@ class ScanEngine {
     Renderer renderer_;
     Calibrations calibrations_;
     SensorAssignment assignment_;
-    SensorWatch probe_watch_, needle_watch_;
+    SensorWatch probe_watch_, needle_watch_, reference_watch_;
     TrackerReading reading_;
     FrameRecord last_;
     ToolPoses tools_;

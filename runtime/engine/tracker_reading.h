@@ -15,6 +15,8 @@ namespace sonocase::runtime::inline engine {
 inline constexpr int kMaxSensors = 16;
 inline constexpr int kProbeSensor = 0;  // unless the sensors are assigned otherwise
 inline constexpr int kNeedleSensor = 1;
+// Fixed to the mannequin, where a tracker knows its sensors by name.
+inline constexpr int kReferenceSensor = 2;
 
 enum class SensorState : std::uint8_t {
     absent,  // no such sensor
@@ -32,6 +34,7 @@ struct SensorReading {
     // reports its sensors one by one gives each its own, so that none vouches for another.
     double time_s = -1;
     bool in_mannequin = false;  // as TrackerReading's, of this sensor alone
+    bool in_reference = false;  // the pose is relative to the reference sensor already
 };
 
 // All sensors at one moment.
@@ -41,6 +44,9 @@ struct TrackerReading {
     double device_time_s = -1;   // on the device's own clock; negative: it has none
     // The sensors are the tools themselves and `world` is the mannequin: no calibration applies.
     bool in_mannequin = false;
+    // Of a recording: the sensors are the tools at their default indices, whatever the user
+    // assigned to those of a device, and relative to any reference.
+    bool placed = false;
     // Force on the probe's face, newtons, from a force or pressure sensor; negative: there is none.
     double force_n = -1;
     int sensor_count = 0;

@@ -381,7 +381,9 @@ void bind_renderer(py::module_& module) {
              py::kw_only(), "frame"_a = 0, "gain_db"_a = 0.0, "press_mm"_a = 0.0,
              "dent"_a = py::none(), "out"_a = py::none(), "mode"_a = "b", "doppler"_a = py::dict(),
              "One frame: uint8 array (height, width). pose: mannequin_from_probe, 4 x 4, mm. "
-             "needle: None, mannequin_from_needle (4 x 4; tip at the origin, z from hub to tip), "
+             "needle: None, mannequin_from_needle (4 x 4; tip at the origin, z from hub to tip, x "
+             "to "
+             "the bevel's side), "
              "or (tip, direction). time_s: drives breathing and pulse. frame: seeds the noise; "
              "sonoplay counts 0, 1, 2, ... press_mm: how much deeper than its pose the probe is "
              "pressed, 0 to 40. dent: (tent_mm, drag_mm), by which the needle pushes the layer "

@@ -103,6 +103,7 @@ void set_needle(py::handle needle, runtime::FrameInput& input) {
     const Rigid pose = rigid_from(needle, "needle");
     input.needle.tip = Point3{} + pose.translation;
     input.needle.direction = pose.rotation.column(2);
+    input.needle.bevel = pose.rotation.column(0);  // as the player has it
 }
 
 void set_dent(py::handle dent, runtime::FrameInput& input, const char* name) {

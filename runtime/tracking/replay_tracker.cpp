@@ -175,6 +175,7 @@ bool ReplayTracker::poll(double now_s, TrackerReading& reading) {
     reading.time_s = std::min(lap_s + recorded_time_s(static_cast<int>(i)), now_s);
     reading.device_time_s = probe[i].timestamp_s;
     reading.in_mannequin = recording_.in_mannequin;
+    reading.placed = true;
     reading.sensor_count = recording_.needle.empty() ? 1 : 2;
     const double until_s = probe[i].timestamp_s + 5e-7;
     if ((back || forward) && !recording_.acts.empty()) {
@@ -296,6 +297,21 @@ Result<Recording> load_recording(const std::string& files,
         sequence.notes.push_back(
             {"{} of {} readings were left out, because their time fell or was no number.",
              {std::to_string(dropped), std::to_string(readings)}});
+    if (needle_index >= 0) {
+        const std::string why = why_no_pose(sequence, sequence.transform_index(needle));
+        if (!why.empty()) sequence.notes.push_back({"No pose of {} counts: {}.", {needle, why}});
+    }
+    for (const std::string& name : sequence.transforms) {
+        // Another probe under a name of its own; images and frames of the same one are none.
+        const std::string from(split_transform_name(name).from);
+        if (tools.empty() && from.starts_with("Probe") && probe.starts_with("Probe") &&
+            from != split_transform_name(probe).from && name != needle && needle.empty()) {
+            sequence.notes.push_back(
+                {"{} is another probe and is not played; choose with --tool probe={}.",
+                 {name, name}});
+            break;
+        }
+    }
     if (needle.empty()) {
         for (const std::string& name : sequence.transforms) {
             if (name == probe || !may_be_a_tool(name)) continue;

@@ -78,6 +78,7 @@ class PacedTracker final : public Tracker {
 
     bool poll(double now_s, TrackerReading& reading) override;
     TrackerHealth health() const override { return inner_->health(); }
+    void set_tools(const ToolNames& tools) override { inner_->set_tools(tools); }
     double duration_s() const override { return inner_->duration_s(); }
     int recorded_readings() const override { return inner_->recorded_readings(); }
     double recorded_time_s(int i) const override { return inner_->recorded_time_s(i); }

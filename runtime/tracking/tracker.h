@@ -35,6 +35,9 @@ struct TrackerHealth {
     std::uint64_t readings = 0;
     std::uint64_t bad_frames = 0;  // discarded: wrong checksum or length, not a number
     std::uint64_t connects = 0;
+    // # sensors: their names where the tracker knows them, as it heard them; empty: it does not, or
+    // the sensor is free.
+    std::vector<std::string> sensors;
 };
 
 class Tracker {
@@ -47,6 +50,8 @@ class Tracker {
     // Sets what the tracker's own thread calls as soon as poll() has something new; {} ends that.
     // A tracker that is a function of time has no thread and ignores it.
     virtual void set_wake(std::function<void()>) {}
+    // Gives roles to names from now on. What knows no names ignores it.
+    virtual void set_tools(const ToolNames&) {}
     // Length of a recording or script; negative: without end.
     virtual double duration_s() const { return -1; }
     // Number of readings of a recording; 0: not a recording.

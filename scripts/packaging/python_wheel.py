@@ -40,7 +40,16 @@ def _built(prefix, build):
     modules = list(pathlib.Path(prefix).rglob("sonocase/_core.*"))
     if len(modules) != 1 or f"cpython-{sys.version_info.major}{sys.version_info.minor}" not in modules[0].name:
         raise SystemExit(f"{build}: holds {[m.name for m in modules]}; expected a module for this Python")
-    return modules[0].parent
+    return modules[0].parent, _numpy_end(pathlib.Path(build, "CMakeCache.txt").read_text())
+
+
+def _numpy_end(cache):
+    """The first major version of NumPy that the module cannot be used with: pybind11 knows NumPy 2
+    from 2.12 on. The module says the same (`_core._NUMPY_END`)."""
+    folder = re.search(r"^pybind11_DIR:\w+=(.+)$", cache, re.M).group(1)
+    version = re.search(r'PACKAGE_VERSION "(\d+)\.(\d+)',
+                        pathlib.Path(folder, "pybind11ConfigVersion.cmake").read_text())
+    return 3 if tuple(map(int, version.groups())) >= (2, 12) else 2
 
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
@@ -48,16 +57,18 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     version, tag = _version(), _tag()
     info = f"sonocase-{version}.dist-info"
     files = {
-        f"{info}/METADATA": "Metadata-Version: 2.1\nName: sonocase\nVersion: " + version +
-                            "\nSummary: Ultrasound frames, labels and scores of case bundles\n"
-                            "License: Apache-2.0\nRequires-Python: >=3.9\nRequires-Dist: numpy\n",
         f"{info}/WHEEL": "Wheel-Version: 1.0\nGenerator: sonocase\nRoot-Is-Purelib: false\n"
                          f"Tag: {tag}\n",
         f"{info}/LICENSE": (ROOT / "LICENSE").read_text(),
     }
     name = f"sonocase-{version}-{tag}.whl"
     with tempfile.TemporaryDirectory() as prefix:
-        package = _built(prefix, (config_settings or {}).get("build"))
+        package, numpy_end = _built(prefix, (config_settings or {}).get("build"))
+        files[f"{info}/METADATA"] = (
+            f"Metadata-Version: 2.1\nName: sonocase\nVersion: {version}\n"
+            "Summary: Ultrasound frames, labels and scores of case bundles\n"
+            "License: Apache-2.0\nRequires-Python: >=3.9\n"
+            f"Requires-Dist: numpy>=1.24,<{numpy_end}\n")
         for path in sorted(package.rglob("*")):
             if path.is_file():
                 files[str(path.relative_to(package.parent))] = path.read_bytes()

@@ -15,12 +15,18 @@
 #include "formats/bundle/codec/flow_codec.h"
 #include "formats/bundle/stage_files.h"
 #include "formats/calibration/calibration.h"
+#include "formats/calibration/foreign_calibration.h"
 #include "formats/calibration/point.h"
 #include "formats/exercise/exercise.h"
+#include "formats/files/load_save.h"
 #include "formats/flow/flow_summary.h"
 #include "formats/machine/machine.h"
+#include "formats/recording/acts.h"
+#include "formats/recording/pose_table.h"
 #include "formats/recording/poses.h"
 #include "formats/recording/sequence.h"
+#include "formats/recording/session.h"
+#include "formats/recording/tool_frames.h"
 #include "formats/recording/transform_log.h"
 #include "formats/text/stage_report_json.h"
 #include "pipeline/anatomy/label_table.h"
@@ -181,6 +187,87 @@ void sequence(Bytes bytes) {
         for (const SequencePose& pose : frame.poses) rigid_from_matrix(pose.to_from);
     }
     check_error(read_sequence(write_sequence(*read, SequenceForm::mha), "fuzz"));
+}
+
+// Tables of one tool or several, and what becomes of them: one sequence with all readings.
+void pose_tables(Bytes bytes) {
+    const auto read = parse_pose_table(text_of(bytes), "fuzz");
+    check_error(read);
+    if (!read) return;
+    demand(!read->empty());
+    std::vector<std::pair<std::string, std::vector<Pose>>> tools;
+    for (const ToolReadings& tool : *read) {
+        for (const ToolReadings& other : *read) demand(&tool == &other || tool.name != other.name);
+        std::vector<double> times_s;
+        for (const Pose& pose : tool.poses) times_s.push_back(pose.timestamp_s);
+        check_error(check_times(times_s, "fuzz"));
+        check_error(check_places(tool.poses, "fuzz"));
+        tools.emplace_back(tool.name + "ToTracker", tool.poses);
+    }
+    const Sequence sequence = sequence_of(tools);
+    demand(sequence.transforms.size() == tools.size());
+    // Times that fall stay, to be counted where time matters.
+    for (const SequenceFrame& frame : sequence.frames) demand(frame.poses.size() == tools.size());
+}
+
+// A recording in whatever form, by its content alone, to the tools that replay and scores take.
+void recordings(Bytes bytes) {
+    const MemoryFile file(bytes);
+    const auto read = load_recording_file(file.path());
+    check_error(read);
+    if (!read) return;
+    Sequence sequence = *read;
+    const int at = find_tool(sequence, ToolRole::probe);
+    const int needle_at = find_tool(sequence, ToolRole::needle);
+    std::string probe = at < 0 ? "" : sequence.transforms[static_cast<std::size_t>(at)];
+    std::string needle =
+        needle_at < 0 ? "" : sequence.transforms[static_cast<std::size_t>(needle_at)];
+    if (at >= 0) why_no_pose(sequence, at);
+    check_error(bring_to_one_frame(sequence, probe, needle, "fuzz"));
+    for (const SequenceFrame& frame : sequence.frames)
+        demand(frame.poses.size() == sequence.transforms.size());
+    // A second time nothing is marked that was not.
+    mark_lost(sequence);
+    const auto session = session_from_sequence(*read, guess_names(*read), "fuzz");
+    check_error(session);
+    if (!session) return;
+    check_error(check_session(*session, "fuzz"));
+    for (const SessionSample& sample : session->samples)
+        demand(!sample.needle_ok || is_finite(sample.mannequin_from_needle));
+}
+
+void acts(Bytes bytes) {
+    std::string unread;
+    const ActList list = acts_of(text_of(bytes), &unread);
+    demand(list.count >= 0 && list.count <= ActList::kMaxActs);
+    for (int i = 0; i < list.count; ++i)
+        demand(std::isfinite(list.acts[static_cast<std::size_t>(i)].amount));
+    unread.clear();
+    demand(acts_of(acts_text(list), &unread) == list && unread.empty());
+}
+
+// Whatever other programs keep: what is read is a rigid motion, and is the same when it is written
+// and read again.
+void foreign_calibration(Bytes bytes) {
+    const std::string_view text = text_of(bytes);
+    const bool looks = looks_like_foreign_calibration(text);
+    for (const char* where : {"needle.xml", "needle.tfm", "needle.txt", "some.tfm"}) {
+        const auto read = parse_foreign_calibrations(text, where);
+        check_error(read);
+        if (!read) continue;
+        demand(!read->empty());
+        for (const Calibration& calibration : *read) {
+            demand(is_finite(calibration.sensor_from_tool));
+            demand(orthonormality_error(calibration.sensor_from_tool.rotation) < 1e-6);
+            if (!looks || calibration.kind != "needle") continue;
+            const double far = norm(calibration.sensor_from_tool.translation);
+            const auto again = parse_foreign_calibrations(
+                format_foreign_calibration(calibration, "needle.tfm"), "needle.tfm");
+            demand(again.has_value() && again->size() == 1);
+            demand(norm((*again)[0].sensor_from_tool.translation -
+                        calibration.sensor_from_tool.translation) <= 1e-6 * (1 + far));
+        }
+    }
 }
 
 void calibration(Bytes bytes) {
@@ -417,6 +504,10 @@ const std::vector<Target>& targets() {
         {"exercise", exercise},
         {"machine", machine},
         {"poses", poses},
+        {"pose_tables", pose_tables},
+        {"recordings", recordings},
+        {"acts", acts},
+        {"foreign_calibration", foreign_calibration},
         {"sequence", sequence},
         {"calibration", calibration},
         {"registration", registration},

@@ -4,19 +4,44 @@
 import pathlib
 import shutil
 import subprocess
+import sys
 
 import pytest
 
 from conftest import BIN
 from test_dataset import content_of, recipe  # noqa: F401  (a fixture)
 
-RENDER = pathlib.Path(__file__).parents[2] / "scripts" / "farm" / "render-dataset"
+FARM = pathlib.Path(__file__).parents[2] / "scripts" / "farm"
+RENDER = FARM / "render-dataset"
 needs_snakemake = pytest.mark.skipif(shutil.which("snakemake") is None, reason="no snakemake")
 
 
 def render(*arguments):
     return subprocess.run([RENDER, "--sonoplay", BIN / "sonoplay", *map(str, arguments)],
                           capture_output=True, text=True)
+
+
+@pytest.mark.parametrize("end, status", [("sys.exit(3)", 3), ("os.kill(os.getpid(), 9)", 137)])
+def test_a_job_that_fails_says_what_it_took(end, status, tmp_path):
+    peak = tmp_path / "peak"
+    job = f"import os, sys; held = b'1' * 200_000_000; {end}"
+    done = subprocess.run([FARM / "run-stage", peak, sys.executable, "-c", job])
+    assert done.returncode == status
+    assert 200 < float(peak.read_text()) < 300
+    assert subprocess.run([FARM / "run-stage", peak, "true"]).returncode == 0
+    assert not peak.exists()
+
+
+def test_a_second_try_asks_by_what_the_first_took(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    source = (FARM / "Snakefile").read_text()
+    names = {"stages_of": {"case": {"import": {"memory_mb": 240}}}}
+    exec(source[source.index("def peak"):source.index("def launcher")], names)
+    asked = [names["memory_mb"]("case", "import", attempt) for attempt in (1, 2, 3)]
+    assert asked == [240, 480, 960]
+    (tmp_path / "logs" / "case").mkdir(parents=True)
+    (tmp_path / "logs" / "case" / "import.peak").write_text("1461\n")
+    assert names["memory_mb"]("case", "import", 2) == 2191
 
 
 @needs_snakemake

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+import sonocase
 from conftest import BIN
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -37,7 +38,17 @@ print(importlib.metadata.version("sonocase"))
     shown = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True,
                            env={"PYTHONPATH": str(tmp_path / "site")})
     assert f"VERSION {shown.stdout.strip()}" in (ROOT / "CMakeLists.txt").read_text()
+    metadata, = (tmp_path / "site").glob("sonocase-*.dist-info/METADATA")
+    assert f"Requires-Dist: numpy>=1.24,<{sonocase._core._NUMPY_END}\n" in metadata.read_text()
     again = pip("install", ROOT, "--config-settings", f"build={tmp_path}", "--no-deps", "--no-index",
                 "--target", tmp_path / "other")
     assert again.returncode != 0 and "CMakeCache.txt" in again.stderr + again.stdout
     assert not (tmp_path / "other").exists()
+
+
+def test_a_numpy_that_it_was_not_built_for_is_named():
+    end = sonocase._core._NUMPY_END
+    program = f"import numpy; numpy.__version__ = '{end}.0.1'; import sonocase"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode != 0
+    assert f"pip install 'numpy<{end}'" in done.stderr

@@ -50,11 +50,11 @@ class Reader {
         : json_(json), bin_(bin), where_(where) {}
 
     Result<std::vector<MeshNode>> read(std::vector<std::string>* aside) {
-        const Json& required = member(json_, "extensionsRequired");
-        if (required.is_array() && !required.empty())
-            return Error{"the file needs the extension " +
-                             required[0].dump(-1, ' ', true, Json::error_handler_t::replace),
-                         where_, "export it without compression"};
+        for (const Json& required : member(json_, "extensionsRequired"))
+            if (!is_of_looks(required))
+                return Error{"the file needs the extension " +
+                                 required.dump(-1, ' ', true, Json::error_handler_t::replace),
+                             where_, "export it without compression"};
         const Json& nodes = member(json_, "nodes");
         if (!nodes.is_array()) return fault("it has no nodes");
         std::vector<int> parent(nodes.size(), -1);
@@ -82,7 +82,14 @@ class Reader {
                 if (aside != nullptr) aside->push_back(node.name);
                 continue;
             }
+            if (nodes[n].contains("skin"))
+                return Error{"'" + node.name + "' is bent by bones (a skin)", where_,
+                             "apply the pose to the mesh (Blender: the modifier Armature, Apply) "
+                             "and export it again"};
             SONOCASE_TRY_DONE(read_mesh(index(nodes[n]["mesh"]), node.surface));
+            if (is_morphed(nodes[n], index(nodes[n]["mesh"])))
+                return Error{"'" + node.name + "' is bent by shape keys (weights of targets)",
+                             where_, "apply the shape keys to the mesh and export it again"};
             for (Point3& p : node.surface.points) p = to_scene * p;
             nodes_.push_back(std::move(node));
         }
@@ -114,6 +121,27 @@ class Reader {
             add(member(nodes[n], "children"));
         }
         return shown;
+    }
+
+    // Extensions that change how a surface looks, and not where it lies.
+    static bool is_of_looks(const Json& extension) {
+        if (!extension.is_string()) return false;
+        const auto name = extension.get<std::string>();
+        for (const char* start : {"KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_",
+                                  "KHR_xmp", "MSFT_texture_"})
+            if (name.starts_with(start)) return true;
+        return false;
+    }
+
+    bool is_morphed(const Json& node, std::size_t mesh) const {
+        const Json& meshes = member(json_, "meshes");
+        for (const Json* weights : {&member(node, "weights"), &member(meshes[mesh], "weights")}) {
+            if (!weights->is_array()) continue;
+            return std::any_of(weights->begin(), weights->end(), [](const Json& weight) {
+                return !weight.is_number() || weight.get<double>() != 0;
+            });
+        }
+        return false;
     }
 
     static const Json& member(const Json& object, const char* key) {

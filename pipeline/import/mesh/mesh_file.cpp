@@ -272,11 +272,19 @@ bool names_no_vertex(vtkPolyData& data) {
     return false;
 }
 
-// The comments of an OBJ, whichever line they stand in.
+// The comments of an OBJ, whichever line they stand in. VTK takes "1,5" for 1 and says nothing:
+// coordinates are looked at here.
 Result<Axes> axes_of_obj(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
     Axes axes = Axes::unsaid;
+    int number = 0;
     for (std::string line; std::getline(file, line);) {
+        ++number;
+        if (line.starts_with("v ") && line.find(',') != std::string::npos)
+            return Error{"a vertex has a comma among its numbers: " + line.substr(0, 40),
+                         path + ":" + std::to_string(number),
+                         "write decimal points: choose English as language of the program that "
+                         "exports it"};
         if (!line.starts_with("#")) continue;
         SONOCASE_TRY(const Axes said, axes_said(line, path));
         if (said != Axes::unsaid) axes = said;
@@ -384,10 +392,13 @@ Result<vtkSmartPointer<vtkPolyData>> read_polygons(const std::string& path,
         const bool obj = ending == ".obj";
         auto data = obj ? read_with<vtkOBJReader>(path, &error)
                         : read_with<vtkXMLPolyDataReader>(path, &error);
-        if (error.empty() && data != nullptr && names_no_vertex(*data))
-            error = "a polygon names a vertex that does not exist";
+        // The reader's own text is for programmers.
         if (!error.empty() || data == nullptr)
-            return Error{"cannot be read as a mesh (" + error + ")", path, kAgain};
+            error = obj ? "cannot be read as OBJ: the file is damaged or of another kind"
+                        : "cannot be read as VTP: the file is damaged or of another kind";
+        else if (names_no_vertex(*data))
+            error = "a polygon names a vertex that does not exist";
+        if (!error.empty()) return Error{error, path, kAgain};
         SONOCASE_TRY(out.axes, obj ? axes_of_obj(path) : axes_of_fields(*data, path));
         return data;
     }
@@ -437,9 +448,8 @@ Result<MeshFile> read_mesh_file(const std::string& path,
         clean->Update();
         out.surface = surface_of(*clean->GetOutput());
         return out;
-    } catch (const std::exception& exception) {
-        return Error{std::string("cannot be read as a mesh (") + exception.what() + ")", path,
-                     kAgain};
+    } catch (const std::exception&) {
+        return Error{"cannot be read as a mesh: the file is damaged", path, kAgain};
     }
 }
 

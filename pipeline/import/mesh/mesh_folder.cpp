@@ -28,7 +28,9 @@ std::vector<std::string> mesh_files(const std::string& path) {
     if (!fs::is_directory(path, code)) return {path};
     std::vector<std::string> files;
     for (const auto& entry : fs::directory_iterator(path, code))
-        if (is_mesh_file(entry.path().string())) files.push_back(entry.path().string());
+        if (!entry.path().filename().string().starts_with('.') &&  // those of macOS, "._liver.stl"
+            is_mesh_file(entry.path().string()))
+            files.push_back(entry.path().string());
     std::sort(files.begin(), files.end());
     return files;
 }
@@ -216,15 +218,32 @@ bool is_mesh_source(const std::string& path) {
     return !mesh_files(path).empty();
 }
 
-Result<MeshBody> read_meshes(const std::string& path,
-                             const std::string& table_path,
-                             const MeshOptions& options,
-                             const Progress& progress) {
+namespace {
+
+Result<NodeTable> table_of(const std::string& path, const std::string& table_path) {
     if (table_path.empty())
         return Error{"meshes without a table of their nodes", path,
                      "give --table NODES.csv: rows of node,label,role"};
     SONOCASE_TRY(auto csv, read_text_file(table_path));
-    SONOCASE_TRY(auto table, parse_node_table(csv, table_path));
+    return parse_node_table(csv, table_path);
+}
+
+}  // namespace
+
+Result<Grid> mesh_grid(const std::string& path,
+                       const std::string& table_path,
+                       const MeshOptions& options) {
+    SONOCASE_TRY(const auto table, table_of(path, table_path));
+    Collector collector(table, options);
+    for (const std::string& file : mesh_files(path)) SONOCASE_TRY_DONE(collector.add_file(file));
+    return grid_of(collector.organs(), options, path);
+}
+
+Result<MeshBody> read_meshes(const std::string& path,
+                             const std::string& table_path,
+                             const MeshOptions& options,
+                             const Progress& progress) {
+    SONOCASE_TRY(const auto table, table_of(path, table_path));
     Collector collector(table, options);
     for (const std::string& file : mesh_files(path)) SONOCASE_TRY_DONE(collector.add_file(file));
     if (!collector.unmapped().empty()) {

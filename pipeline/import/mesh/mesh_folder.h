@@ -44,6 +44,11 @@ struct MeshBody {
 
 bool is_mesh_source(const std::string& path);  // a mesh file, or a folder with one
 
+// The grid of read_meshes alone, before anything is mended or filled. Errors: those of reading.
+Result<Grid> mesh_grid(const std::string& path,
+                       const std::string& table_path,
+                       const MeshOptions& options);
+
 // GLB is in metres, y to the head, z to the front, x to the patient's left; everything else is in
 // mm, RAS+ or LPS+ as its header says, RAS+ if none says anything; the report's note "axes" says
 // which. Nodes of one label are one solid. Errors: what the readers refuse; nodes without a row,

@@ -128,8 +128,12 @@ Result<Header> parse_header(const std::string& bytes, const std::string& path) {
     if (!bytes.starts_with("ply")) return bad("not a PLY file");
     Header header;
     std::size_t at = 0;
+    // Some programs end lines with a carriage return alone.
+    const std::size_t first_end = bytes.find_first_of("\r\n");
+    const bool returns =
+        first_end < bytes.size() - 1 && bytes[first_end] == '\r' && bytes[first_end + 1] != '\n';
     for (int line_number = 1;; ++line_number) {
-        const std::size_t end = bytes.find('\n', at);
+        const std::size_t end = bytes.find(returns ? '\r' : '\n', at);
         if (end == std::string::npos) return bad("PLY header is cut off");
         const std::string text = bytes.substr(at, end - at);
         std::istringstream line(text);
@@ -163,7 +167,7 @@ Result<Header> parse_header(const std::string& bytes, const std::string& path) {
             property.is_list = type == "list";
             if (property.is_list) line >> count_type >> type;
             line >> name;
-            property.name = name;
+            property.name = lower_case(name);
             if (!line || header.elements.empty() || !type_named(type, &property.type) ||
                 (property.is_list && !type_named(count_type, &property.count_type)))
                 return bad("PLY header, line " + std::to_string(line_number) +
@@ -172,7 +176,39 @@ Result<Header> parse_header(const std::string& bytes, const std::string& path) {
         }
     }
     header.body = at;
+    for (const Element& element : header.elements)
+        for (const char* axis : {"x", "y", "z"})
+            if (element.name == "vertex" &&
+                std::none_of(element.properties.begin(), element.properties.end(),
+                             [&](const Property& p) { return p.name == axis && !p.is_list; }))
+                return bad(std::string("vertices of a PLY file without the property ") + axis);
     return header;
+}
+
+Error no_such_vertex(std::uint64_t face, const std::string& path) {
+    return {"face " + std::to_string(face) + " names a vertex that does not exist", path,
+            "check that the file is complete; export it again"};
+}
+
+// The corners of strips one after another, as VTK's cells and Stanford's old scans have them; -1
+// begins another strip. Every second triangle is turned.
+void add_strips(const std::vector<double>& strip, PolygonFile& file) {
+    std::size_t first = 0;
+    for (std::size_t n = 0; n < strip.size(); ++n) {
+        if (strip[n] < 0) {
+            first = n + 1;
+            continue;
+        }
+        if (n < first + 2) continue;
+        const bool turned = (n - first) % 2 != 0;
+        const double corners[3] = {strip[n - 2], strip[n - (turned ? 0 : 1)],
+                                   strip[n - (turned ? 1 : 0)]};
+        if (corners[0] == corners[1] || corners[1] == corners[2] || corners[0] == corners[2])
+            continue;
+        for (const double corner : corners)
+            file.corners.push_back(static_cast<std::uint32_t>(corner));
+        file.ends.push_back(file.corners.size());
+    }
 }
 
 }  // namespace
@@ -191,7 +227,9 @@ Result<PolygonFile> read_ply_file(const std::string& path) {
         };
         // An entry takes at least one byte in either form; one without properties means damage.
         if (element.count > body.left()) return cut_off(0);
-        const bool is_vertex = element.name == "vertex", is_face = element.name == "face";
+        const bool is_vertex = element.name == "vertex", is_strip = element.name == "tristrips",
+                   is_face = element.name == "face" || is_strip;
+        std::vector<double> strip;
         const bool has_normals =
             is_vertex && std::any_of(element.properties.begin(), element.properties.end(),
                                      [](const Property& p) { return p.name == "nx"; });
@@ -219,15 +257,22 @@ Result<PolygonFile> read_ply_file(const std::string& path) {
                 const std::size_t first = file.corners.size();
                 const bool is_polygon = is_face && (property.name == "vertex_indices" ||
                                                     property.name == "vertex_index");
+                strip.clear();
                 for (int c = 0; c < static_cast<int>(count); ++c) {
                     const double corner = body.next(property.type);
                     if (!is_polygon) continue;
-                    if (!(corner >= 0) || corner >= static_cast<double>(file.points.size()))
-                        return Error{
-                            "face " + std::to_string(n) + " names a vertex that does not exist",
-                            path, "check that the file is complete; export it again"};
-                    file.corners.push_back(static_cast<std::uint32_t>(corner));
+                    if (is_strip && corner == -1) {
+                        strip.push_back(corner);
+                        continue;
+                    }
+                    if (!(corner >= 0) || corner > UINT32_MAX) return no_such_vertex(n, path);
+                    if (is_strip)
+                        strip.push_back(corner);
+                    else
+                        file.corners.push_back(static_cast<std::uint32_t>(corner));
                 }
+                add_strips(strip, file);
+                if (is_strip) continue;
                 if (is_polygon && file.corners.size() - first >= 3) {
                     file.ends.push_back(file.corners.size());
                 } else {
@@ -239,6 +284,13 @@ Result<PolygonFile> read_ply_file(const std::string& path) {
             if (has_normals) file.normals.push_back(normal);
         }
     }
+    // Faces may stand before the vertices.
+    for (std::size_t c = 0; c < file.corners.size(); ++c)
+        if (file.corners[c] >= file.points.size())
+            return no_such_vertex(
+                static_cast<std::uint64_t>(std::upper_bound(file.ends.begin(), file.ends.end(), c) -
+                                           file.ends.begin()),
+                path);
     if (file.normals.size() != file.points.size()) file.normals.clear();
     return file;
 }
@@ -552,8 +604,28 @@ class StlText {
 bool is_stl_text(std::string_view bytes) {
     const std::string head = lower_case(bytes.substr(0, 4096));
     const std::size_t first = head.find_first_not_of(" \t\r\n");
-    return first != head.npos && head.compare(first, 5, "solid") == 0 &&
+    return first != head.npos && head.find('\0') == head.npos &&
+           head.compare(first, 5, "solid") == 0 &&
            (head.find("facet", first) != head.npos || head.find("endsolid", first) != head.npos);
+}
+
+// The two bytes behind a triangle say how many of the writer's own follow; most programs put a
+// colour or anything there, and no bytes.
+std::size_t attribute_bytes(std::string_view bytes, std::size_t at) {
+    std::uint16_t own = 0;
+    std::memcpy(&own, bytes.data() + at + 48, sizeof own);
+    return own;
+}
+
+// Whether those numbers account for the file's length.
+bool more_behind_triangles(std::string_view bytes, std::uint32_t count) {
+    std::size_t at = 84;
+    for (std::uint32_t n = 0; n < count; ++n) {
+        if (bytes.size() - at < 50) return false;
+        at += 50 + attribute_bytes(bytes, at);
+        if (at > bytes.size()) return false;
+    }
+    return at == bytes.size();
 }
 
 }  // namespace
@@ -582,8 +654,18 @@ Result<TriangleFile> read_stl_file(const std::string& path) {
     const std::string header(bytes.substr(0, 80));
     SONOCASE_TRY(file.axes, axes_said(header.substr(0, header.find('\0')), path));
     file.corners.resize(9ull * count);
-    for (std::uint64_t n = 0; n < count; ++n)
-        std::memcpy(&file.corners[9 * n], bytes.data() + 84 + 50 * n + 12, 36);
+    const bool more = bytes.size() > size && more_behind_triangles(bytes, count);
+    std::size_t at = 84;
+    for (std::uint64_t n = 0; n < count; ++n) {
+        std::memcpy(&file.corners[9 * n], bytes.data() + at + 12, 36);
+        at += 50 + (more ? attribute_bytes(bytes, at) : 0);
+    }
+    // A second solid, or a count that was never set right.
+    constexpr std::size_t kTail = 134;
+    if (bytes.size() - at >= kTail)
+        return Error{"STL file holds " + std::to_string(bytes.size() - at) + " bytes behind the " +
+                         std::to_string(count) + " triangles that it says it has",
+                     path, "join its solids into one mesh and export it again"};
     return file;
 }
 

@@ -132,6 +132,27 @@ void reduce_points(Surface& cloud, StageReport* report) {
     report->measures.push_back({"sparse_points", static_cast<double>(sparse)});
 }
 
+bool is_finite(Point3 p) {
+    return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
+}
+
+// Takes away the points of a cloud that are not finite; returns how many.
+std::size_t leave_out_holes(Surface& cloud) {
+    if (!cloud.triangles.empty()) return 0;
+    std::size_t kept = 0;
+    const std::size_t given = cloud.points.size();
+    const bool normals = !cloud.normals.empty();
+    for (std::size_t n = 0; n < given; ++n) {
+        if (!is_finite(cloud.points[n])) continue;
+        cloud.points[kept] = cloud.points[n];
+        if (normals) cloud.normals[kept] = cloud.normals[n];
+        ++kept;
+    }
+    cloud.points.resize(kept);
+    if (normals) cloud.normals.resize(kept);
+    return given - kept;
+}
+
 struct GivenSurface {
     Surface surface;  // as given, GLB in metres
     Axes axes = Axes::unsaid;
@@ -260,9 +281,18 @@ Result<Surface> import_surface(const std::string& path,
     if (surface.points.empty())
         return Error{"surface holds no points", path,
                      "expected the digitised skin; check that this is the right file"};
+    if (const std::size_t holes = leave_out_holes(surface); holes > 0)
+        own.warnings.push_back(std::to_string(holes) +
+                               " points that are no numbers (NaN), as depth cameras write them for "
+                               "what they do not see, were left out");
     for (const Point3 p : surface.points)
-        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
-            return Error{"surface has a vertex that is not finite", path, "export it again"};
+        if (!is_finite(p))
+            return Error{"a triangle has a corner that is no number (NaN)", path,
+                         "take such vertices away (MeshLab: Filters, Cleaning and Repairing) and "
+                         "export it again"};
+    if (surface.points.empty())
+        return Error{"no point of the surface is a number", path,
+                     "expected the digitised skin; export it again"};
     if (options.torso && surface.points.size() < kMinSurfacePoints)
         return Error{
             "surface of " + std::to_string(surface.points.size()) + " points", path,

@@ -189,17 +189,11 @@ Result<NativeVolume> read_itk_volume(const std::string& path, const VolumeReadin
             if (itk::ExposeMetaData(dictionary, key, value)) volume.fields[key] = value;
         }
         return volume;
-    } catch (const itk::ExceptionObject& exception) {
-        std::string what = exception.GetDescription();
-        if (const auto at = what.find("): "); at != std::string::npos) what = what.substr(at + 3);
-        // Of a chain of functions that passed a failure on, the last one says what it was.
-        if (const auto last = what.rfind("[nrrd] "); last != std::string::npos)
-            if (const auto at = what.find(": ", last); at != std::string::npos)
-                what = trimmed(what.substr(at + 2));
-        return Error{"cannot be read as a volume (" + what + ")", path, todo};
-    } catch (const std::exception& exception) {
-        return Error{std::string("cannot be read as a volume (") + exception.what() + ")", path,
-                     todo};
+    } catch (const std::exception&) {  // its text is for programmers
+        return Error{
+            "the voxels cannot be read: the file is damaged, or packed in a way that is not known "
+            "here",
+            path, "copy it or export it again, as .nii.gz or .nrrd"};
     }
 }
 

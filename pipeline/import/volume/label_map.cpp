@@ -21,6 +21,7 @@
 #include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/base/source_checks.h"
 #include "pipeline/base/stopwatch.h"
+#include "pipeline/base/text.h"
 #include "pipeline/import/volume/label_numbering.h"
 #include "pipeline/import/volume/native_volume.h"
 #include "pipeline/import/volume/nifti_file.h"
@@ -61,7 +62,8 @@ const LabelTableEntry* entry_of(const LabelTable& table, int value) {
 Status check_table(const LabelTable& table, const std::string& where) {
     for (std::size_t i = 0; i < table.size(); ++i)
         for (std::size_t j = i + 1; j < table.size(); ++j)
-            if (table[i].value == table[j].value && table[i].layer == table[j].layer)
+            if (table[i].value == table[j].value && table[i].layer == table[j].layer &&
+                table[i].name != table[j].name)
                 return Error{"value " + std::to_string(table[i].value) + " has two names, '" +
                                  table[i].name + "' and '" + table[j].name + "'",
                              where, "give each value one row"};
@@ -238,6 +240,7 @@ BodySummary summary_of(const StructureList& list, double scale) {
             sum = sum + run.count * at;
             squares = squares + run.count * Vector3{at.x * at.x, at.y * at.y, at.z * at.z};
             const double half = std::min(0.5 * (run.count - 1.0), 0.5 * (grid.size.x - 1.0));
+            squares.x += run.count * half * (half + 1) / 3;
             box.include(Point3{std::max(0.0, at.x - half), at.y, at.z});
             box.include(Point3{std::min(grid.size.x - 1.0, at.x + half), at.y, at.z});
         }
@@ -252,8 +255,7 @@ BodySummary summary_of(const StructureList& list, double scale) {
         for (int axis = 0; axis < 3; ++axis) {
             const double spread =
                 squares[axis] / static_cast<double>(s.voxels) - mean[axis] * mean[axis];
-            one.length_mm = std::max(one.length_mm,
-                                     std::sqrt(12 * std::max(spread, 0.0)) * body.voxel_mm[axis]);
+            one.length_mm[axis] = std::sqrt(12 * std::max(spread, 0.0) + 1) * body.voxel_mm[axis];
             const auto a = static_cast<std::size_t>(axis);
             one.cut_low[a] = box.lower[axis] < 1;
             one.cut_high[a] = box.upper[axis] > grid.size[axis] - 2;
@@ -331,6 +333,41 @@ Status assume_names(const std::string& path,
     return Done{};
 }
 
+bool holds(const Structure& structure, std::uint64_t voxel) {
+    const auto after =
+        std::upper_bound(structure.runs.begin(), structure.runs.end(), voxel,
+                         [](std::uint64_t v, const VoxelRun& run) { return v < run.first; });
+    return after != structure.runs.begin() &&
+           voxel - std::prev(after)->first < std::prev(after)->count;
+}
+
+// Some programs write the outside as a label of its own: -1, 255, "Exterior". Only 0 is outside
+// here.
+void leave_out_background(StructureList& list) {
+    const Grid& grid = list.grid;
+    std::uint64_t labelled = 0;
+    for (const Structure& s : list.structures) labelled += s.voxels;
+    std::erase_if(list.structures, [&](const Structure& s) {
+        const std::string name = lower_case(s.entry.name);
+        bool outside = name == "background" || name == "exterior" || name == "clear label" ||
+                       name == "clear_label" || name == "unlabeled" || name == "unlabelled";
+        if (!outside && name.empty() && labelled == grid.voxel_count()) {
+            outside = true;
+            for (int corner = 0; corner < 8; ++corner)
+                outside = outside && holds(s, grid.index((corner & 1) ? grid.size.x - 1 : 0,
+                                                         (corner & 2) ? grid.size.y - 1 : 0,
+                                                         (corner & 4) ? grid.size.z - 1 : 0));
+        }
+        if (outside && s.voxels > 0)
+            list.warnings.push_back(
+                "value " + std::to_string(s.entry.value) +
+                (name.empty() ? " holds all corners of the map, and no voxel is 0: it is"
+                              : " ('" + s.entry.name + "') is") +
+                " taken as the outside; if it is a structure, give it a name with --table");
+        return outside;
+    });
+}
+
 // Reads a single file or a DICOM series.
 Result<StructureList> read_label_file(const std::string& path, const ImportOptions& options) {
     SONOCASE_TRY(auto file, read_label_layers(path, options.reading));
@@ -391,6 +428,7 @@ Result<StructureList> read_label_file(const std::string& path, const ImportOptio
         const std::string_view total = totalsegmentator_name(value);
         unlike_total = unlike_total || (!total.empty() && structure.entry.name != total);
     }
+    leave_out_background(list);
     // Segments and names unlike TotalSegmentator's say that it did not number the values.
     if (sources.segments.empty() && !unlike_total) {
         SONOCASE_TRY_DONE(assume_names(path, options, none_named, list));
@@ -402,7 +440,9 @@ bool is_mask_folder(const std::string& path) {
     std::error_code code;
     if (!fs::is_directory(path, code)) return false;
     for (const auto& entry : fs::directory_iterator(path, code))
-        if (is_volume_file_name(entry.path().string())) return true;
+        if (!entry.path().filename().string().starts_with('.') &&
+            is_volume_file_name(entry.path().string()))
+            return true;
     return false;
 }
 

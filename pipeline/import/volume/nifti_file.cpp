@@ -491,8 +491,17 @@ Result<NativeVolume> read_nifti_volume(const std::string& path, const VolumeRead
         if (count < static_cast<int>(piece)) return not_there(position, needed, path);
         at += piece;
     }
-    while (gzread(file.get(), rest.data(), static_cast<unsigned>(rest.size())) > 0) {
-    }
+    std::uint64_t behind = 0;
+    for (int count = 0;
+         (count = gzread(file.get(), rest.data(), static_cast<unsigned>(rest.size()))) > 0;)
+        behind += static_cast<std::uint64_t>(count);
+    const Int3 size = header.placement.size;
+    if (behind >= static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) *
+                      bytes_of(header.component))
+        volume.warnings.push_back(
+            "the file holds " + std::to_string(behind) +
+            " bytes more than its header asks for: check size and type of its voxels (dim, "
+            "datatype), or write it again");
     int status = Z_OK;  // of the whole stream: its checksum comes last
     gzerror(file.get(), &status);
     if (status != Z_OK && status != Z_STREAM_END)

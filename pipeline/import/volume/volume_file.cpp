@@ -10,6 +10,7 @@
 #include <unordered_map>
 
 #include "pipeline/base/source_checks.h"
+#include "pipeline/base/text.h"
 #include "pipeline/import/volume/dicom_frames.h"
 #include "pipeline/import/volume/native_volume.h"
 #include "pipeline/import/volume/nifti_file.h"
@@ -261,6 +262,7 @@ Result<LabelLayers> read_label_layers(const std::string& path, const VolumeReadi
 
     ValueTable table;
     enum { kFine, kTooMany, kNotWhole } verdict = kFine;
+    double not_whole = 0;  // the first such value
     const Scale scale = scale_of(native);
     with_voxels(native, [&](const auto* voxels) {
         using Stored = std::remove_cvref_t<decltype(*voxels)>;
@@ -274,6 +276,7 @@ Result<LabelLayers> read_label_layers(const std::string& path, const VolumeReadi
                 std::int32_t value = 0;
                 if (!whole_number(stored, scale, &value)) {
                     verdict = kNotWhole;
+                    not_whole = scale.slope * static_cast<double>(stored) + scale.intercept;
                     return 0;
                 }
                 const int place = table.place(value);
@@ -303,8 +306,16 @@ Result<LabelLayers> read_label_layers(const std::string& path, const VolumeReadi
             });
         }
     });
+    if (verdict == kNotWhole && !std::isfinite(not_whole))
+        return Error{"voxels hold values that are no numbers (NaN)", path,
+                     "expected a label map with 0 outside: write 0 in their place (fslmaths IN "
+                     "-nan OUT)"};
+    if (verdict == kNotWhole && std::abs(not_whole) > 2e9)
+        return Error{text("voxels hold values as large as %.10g", not_whole), path,
+                     "expected labels below 2 thousand million: number them anew"};
     if (verdict == kNotWhole)
-        return Error{"voxels hold values that are not whole numbers", path,
+        return Error{text("voxels hold values that are not whole numbers, such as %.6g", not_whole),
+                     path,
                      "expected a label map; is this the scan itself, or a map resampled smoothly?"};
     if (verdict == kTooMany)
         return Error{

@@ -152,10 +152,20 @@ double robust_rms(const Matches& matches) {
 
 }  // namespace
 
+SplinePenalty field_penalty(const SkinModel& skin,
+                            const Box3& ct_box,
+                            const ResidualOptions& options) {
+    SplinePenalty penalty(grid_over(ct_box, options.spacing_mm),
+                          options.bending * 50 * 50 * 50 * 50, options.stretching * 50 * 50);
+    add_depth_penalty(skin, ct_box, options, &penalty);
+    return penalty;
+}
+
 FieldFit fit_field(const SkinModel& skin,
                    const TargetSurface& target,
                    std::span<const std::uint32_t> readings,
                    const ResidualOptions& options,
+                   const SplinePenalty& penalty,
                    Registration* registration,
                    const Progress& progress) {
     FieldFit fit;
@@ -164,8 +174,6 @@ FieldFit fit_field(const SkinModel& skin,
     const std::size_t count = static_cast<std::size_t>(shape.size.x) * shape.size.y * shape.size.z;
     const std::size_t stride = std::max<std::size_t>(
         1, skin.points.size() / static_cast<std::size_t>(std::max(1, options.skin_queries)));
-    SplinePenalty penalty(shape, options.bending * 50 * 50 * 50 * 50, options.stretching * 50 * 50);
-    add_depth_penalty(skin, r.ct_box, options, &penalty);
     std::vector<Lanes> d(count, Lanes{0, 0, 0, 0});
     const bool warm = r.residual.control_mm.size() == count;
     if (warm) {
@@ -234,7 +242,8 @@ ResidualReport fit_residual(const SkinModel& skin,
     ResidualOptions tried = options;
     Registration trial = *registration;
     for (int attempt = 0; attempt < options.attempts; ++attempt) {
-        const FieldFit fit = fit_field(skin, target, readings, tried, &trial, progress);
+        const FieldFit fit = fit_field(skin, target, readings, tried,
+                                       field_penalty(skin, trial.ct_box, tried), &trial, progress);
         report.iterations += fit.iterations;
         report.bending = tried.bending;
         report.depth_penalty = tried.depth_penalty;

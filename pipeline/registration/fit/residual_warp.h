@@ -15,6 +15,7 @@
 
 #include "pipeline/base/progress.h"
 #include "pipeline/registration/fit/matching.h"
+#include "pipeline/registration/fit/spline_penalty.h"
 #include "pipeline/registration/map/registration.h"
 
 namespace sonocase::pipeline::inline registration_fit {
@@ -45,8 +46,14 @@ struct ResidualReport {
     int iterations = 0;                          // of conjugate gradients
 };
 
+// What a field costs. The same for every pose of a skin in its box.
+SplinePenalty field_penalty(const SkinModel& skin,
+                            const Box3& ct_box,
+                            const ResidualOptions& options);
+
 // The field without proof, for comparing poses: sets registration's residual. An existing one on
 // the same grid is the start.
+// penalty  of skin, registration's box and options
 struct FieldFit {
     Matches matches;        // after the last solve
     double energy_mm2 = 0;  // bending, stretching and depth together
@@ -57,6 +64,7 @@ FieldFit fit_field(const SkinModel& skin,
                    const TargetSurface& target,
                    std::span<const std::uint32_t> readings,
                    const ResidualOptions& options,
+                   const SplinePenalty& penalty,
                    Registration* registration,
                    const Progress& progress = {});
 

@@ -10,7 +10,6 @@
 #include <Eigen/Dense>
 
 #include "formats/base/constants.h"
-#include "formats/base/random.h"
 #include "pipeline/base/parallel.h"
 #include "pipeline/registration/fit/quadratic_warp.h"
 
@@ -200,43 +199,82 @@ RigidCandidate descend(const Pair& pair,
     return scored(pair, hints, pose);
 }
 
+// The readings' own axes, from the longest to the shortest, each towards its longer tail: starts
+// that are laid in them depend neither on the tracker's frame nor on chance.
+Matrix3 axes_of(const TargetSurface& target) {
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    const auto at = [&](std::size_t i) {
+        const Point3 p = target.points[i];
+        return Eigen::Vector3d{p.x, p.y, p.z};
+    };
+    double count = 0;
+    for (std::size_t i = 0; i < target.points.size(); ++i) {
+        if (target.lifted[i]) continue;
+        mean += at(i);
+        ++count;
+    }
+    if (count < 3) return {};
+    mean /= count;
+    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+    for (std::size_t i = 0; i < target.points.size(); ++i) {
+        if (target.lifted[i]) continue;
+        const Eigen::Vector3d d = at(i) - mean;
+        spread += d * d.transpose();
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
+    Vector3 axis[2];
+    for (int a = 0; a < 2; ++a) {
+        const Eigen::Vector3d v = solver.eigenvectors().col(2 - a);
+        double tail = 0;
+        for (std::size_t i = 0; i < target.points.size(); ++i) {
+            if (target.lifted[i]) continue;
+            const double along = v.dot(at(i) - mean);
+            tail += along * along * along;
+        }
+        axis[a] = (tail < 0 ? -1.0 : 1.0) * Vector3{v[0], v[1], v[2]};
+    }
+    return nearest_rotation(Matrix3::from_columns(axis[0], axis[1], cross(axis[0], axis[1])));
+}
+
+// Unit, perpendicular to v: along that axis which v is farthest from.
+Vector3 perpendicular_to(Vector3 v, const Matrix3& axes) {
+    Vector3 best = axes.column(0);
+    for (int a = 1; a < 3; ++a)
+        if (std::abs(dot(axes.column(a), v)) < std::abs(dot(best, v))) best = axes.column(a);
+    return normalized(best - dot(best, v) * v);
+}
+
 // Rotations spread evenly over all (a super-Fibonacci spiral of quaternions, Alexa 2022), or over
 // those that carry the head within a cone about `up`.
-std::vector<Matrix3> spread_rotations(const RigidOptions& options) {
-    RandomStream random(options.seed);
+std::vector<Matrix3> spread_rotations(const RigidOptions& options, const Matrix3& axes) {
     const int count = std::max(1, options.starts);
     std::vector<Matrix3> rotations;
     if (options.hints.up) {
         // Head directions on rings of a cap, each with rotations about it.
         const Vector3 up = normalized(*options.hints.up);
-        const Vector3 u = any_perpendicular(up), v = cross(up, u);
-        const double phase = 2 * kPi * random.unit();
+        const Vector3 u = perpendicular_to(up, axes), v = cross(up, u);
         constexpr double kGolden = 2.39996322972865332;
         for (int n = 0; n < count; ++n) {
             const double s = (n % 8 + 0.5) / 8;
             const double tilt = options.cone_rad * std::sqrt(s) * 0.7;
-            const double around = phase + kGolden * n;
+            const double around = kGolden * n;
             const Vector3 head = std::cos(tilt) * up +
                                  std::sin(tilt) * (std::cos(around) * u + std::sin(around) * v);
-            const Vector3 x = any_perpendicular(head), y = cross(head, x);
-            const double roll = phase + 2 * kPi * n / count;
+            const Vector3 x = perpendicular_to(head, axes), y = cross(head, x);
+            const double roll = 2 * kPi * n / count;
             const Vector3 right = std::cos(roll) * x + std::sin(roll) * y;
             rotations.push_back(Matrix3::from_columns(right, cross(head, right), head));
         }
         return rotations;
     }
-    const double a = random.unit(), b = random.unit(), c = random.unit();
-    const Matrix3 whole = rotation_from_quaternion(
-        {std::sqrt(1 - a) * std::sin(2 * kPi * b), std::sqrt(1 - a) * std::cos(2 * kPi * b),
-         std::sqrt(a) * std::sin(2 * kPi * c), std::sqrt(a) * std::cos(2 * kPi * c)});
     for (int n = 0; n < count; ++n) {
         const double s = n + 0.5, t = s / count;
         const double alpha = 2 * kPi * s / std::sqrt(2.0),
                      beta = 2 * kPi * s / 1.533751168755204288;
-        rotations.push_back(whole * rotation_from_quaternion({std::sqrt(t) * std::sin(alpha),
-                                                              std::sqrt(t) * std::cos(alpha),
-                                                              std::sqrt(1 - t) * std::sin(beta),
-                                                              std::sqrt(1 - t) * std::cos(beta)}));
+        rotations.push_back(axes * rotation_from_quaternion({std::sqrt(t) * std::sin(alpha),
+                                                             std::sqrt(t) * std::cos(alpha),
+                                                             std::sqrt(1 - t) * std::sin(beta),
+                                                             std::sqrt(1 - t) * std::cos(beta)}));
     }
     return rotations;
 }
@@ -289,7 +327,7 @@ std::vector<RigidCandidate> align_rigid_candidates(const SkinModel& skin,
                                                    const RigidOptions& options,
                                                    const Progress& progress) {
     const Pair coarse = make_pair_of(skin, target, options.coarse_points);
-    const std::vector<Matrix3> rotations = spread_rotations(options);
+    const std::vector<Matrix3> rotations = spread_rotations(options, axes_of(target));
     const int offsets = std::max(1, options.offsets);
     std::vector<RigidCandidate> found(rotations.size() * static_cast<std::size_t>(offsets));
     parallel_for(rotations.size(), 1, [&](std::size_t begin, std::size_t end) {

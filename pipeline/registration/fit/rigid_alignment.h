@@ -4,7 +4,8 @@
 // starts.
 //
 // Source: the paper's second stage ("multiple (randomly selected) starting offsets and rotations").
-// Departures: starts are spread evenly over all rotations and the seed rotates the whole set; gaps
+// Departures: starts are spread evenly over all rotations, in the readings' own axes: nothing is
+// drawn at random, and the tracker's frame does not matter; gaps
 // are point-to-plane in both directions with a robust weight, which needs a sixth of the iterations
 // and ends closer; points without a counterpart count in the score, so that sliding off an open,
 // longer or partly swept mannequin does not pay. Several distinct candidates are returned: a torso
@@ -51,7 +52,6 @@ struct RigidOptions {
     int candidates = 6;  // returned
     PoseHints hints;
     double cone_rad = 0.7;  // with hints.up: largest tilt of the head from it
-    std::uint64_t seed = 1;
 };
 
 struct RigidCandidate {

@@ -60,9 +60,9 @@ Result<Done> check_units(const Box3& box) {
     if (diagonal >= 100 && diagonal <= 5000) return Done{};
     const char* unit = "check the units";
     if (diagonal >= 0.1 && diagonal < 5) {
-        unit = "these look like metres: multiply by 1000";
+        unit = "these look like metres: give --scale 1000";
     } else if (diagonal >= 10 && diagonal < 100) {
-        unit = "these look like centimetres: multiply by 10";
+        unit = "these look like centimetres: give --scale 10";
     } else if (diagonal >= 1e5 && diagonal < 5e6) {
         unit = "these look like micrometres: divide by 1000";
     }

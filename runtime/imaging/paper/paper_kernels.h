@@ -23,8 +23,8 @@ struct PaperBlock {
     // Effect deformation; null: nothing is pressed.
     const press::PressView* press = nullptr;
     int first_line = 0;
-    // Twelve rows of `lines`, in 1/65536: voxels per mm along the beam (3) and beside it (3), texture
-    // periods likewise.
+    // Twelve rows of `lines`, in 1/65536: voxels per mm along the beam (3) and beside it (3),
+    // texture periods likewise.
     const float* directions = nullptr;
     const std::int32_t* closed_material = nullptr;
     bool texture = true;

@@ -350,6 +350,7 @@ void TruthRenderer::Impl::needle_facts(const FrameInput& input) {
     truth.tip_label = 0;
     if (!truth.has_needle) return;
     truth.needle = {input.needle.tip, normalized(input.needle.direction)};
+    if (std::isfinite(norm(input.needle.bevel))) truth.needle.bevel = input.needle.bevel;
     if (probe) {
         const NeedlePose& in = input.needle;
         const NeedleDent dent = bounded_dent(shape.tip, shape.axis, in.tent_mm, in.drag_mm);

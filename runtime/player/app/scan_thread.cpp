@@ -131,6 +131,11 @@ void ScanThread::set_sound(SoundSink sink) {
     sound_ = std::move(sink);
 }
 
+void ScanThread::set_tools(const ToolNames& tools) {
+    const std::lock_guard lock(mutex_);
+    if (tracker_) tracker_->set_tools(tools);
+}
+
 void ScanThread::set_calibrations(const Calibrations& calibrations) {
     const std::lock_guard lock(mutex_);
     calibrations_ = calibrations;
@@ -237,6 +242,7 @@ void ScanThread::describe(ScanFrame& out, double now_s) const {
     std::copy_n(costs.begin(), out.cost_count, out.costs.begin());
     out.probe_verdict = waiting_ ? SensorVerdict::absent : engine_->probe_verdict(now_s);
     out.needle_verdict = waiting_ ? SensorVerdict::absent : engine_->needle_verdict(now_s);
+    out.reference_verdict = waiting_ ? SensorVerdict::absent : engine_->reference_verdict(now_s);
 }
 
 // Statistics and cine loop of a live frame. arrived: with a new reading.

@@ -69,6 +69,7 @@ class ScanThread {
     void set_doppler(std::unique_ptr<DopplerView> doppler);
     void set_sound(SoundSink sink);
     void set_tracker(std::shared_ptr<Tracker> tracker);
+    void set_tools(const ToolNames& tools);  // of the tracker in use
     void set_calibrations(const Calibrations& calibrations);
     void set_observer(FrameObserver observer);
     // Runs `use` between two frames; false when there is no engine.

@@ -94,10 +94,13 @@ Settings load_settings(const std::string& path, std::string& warning) {
     take(in, "calibrations", s.calibrations);
     take(in, "probe_sensor", s.probe_sensor);
     take(in, "needle_sensor", s.needle_sensor);
+    take(in, "reference_sensor", s.reference_sensor);
+    take(in, "tools", s.tools);
     s.window_width_px = std::clamp(s.window_width_px, 960, 7680);
     s.window_height_px = std::clamp(s.window_height_px, 600, 4320);
     s.probe_sensor = std::clamp(s.probe_sensor, -1, 15);
     s.needle_sensor = std::clamp(s.needle_sensor, -1, 15);
+    s.reference_sensor = std::clamp(s.reference_sensor, -1, 15);
     limit(s.ui_scale, 0, 4);
     limit(s.gain_db, -30, 30);
     limit(s.dynamic_range_db, 30, 100);
@@ -125,7 +128,9 @@ Status save_settings(const Settings& s, const std::string& path) {
                       {"recent", s.recent},
                       {"calibrations", s.calibrations},
                       {"probe_sensor", s.probe_sensor},
-                      {"needle_sensor", s.needle_sensor}};
+                      {"needle_sensor", s.needle_sensor},
+                      {"reference_sensor", s.reference_sensor},
+                      {"tools", s.tools}};
     // File names need not be UTF-8: bytes that are not are replaced, and the rest is kept.
     return write_file(path, out.dump(2, ' ', false, json::error_handler_t::replace) + "\n");
 }

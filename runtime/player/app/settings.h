@@ -36,7 +36,9 @@ struct Settings {
     std::map<std::string, std::vector<std::string>> exam_sets;  // case -> exercises
     std::vector<std::string> recent;                            // bundles, newest first; at most 12
     std::vector<std::string> calibrations;                      // files in use
-    int probe_sensor = 0, needle_sensor = 1;                    // from 0; -1: none
+    // Of a device whose sensors have numbers: from 0; -1: none.
+    int probe_sensor = 0, needle_sensor = 1, reference_sensor = -1;
+    std::vector<std::string> tools;  // "needle=StylusTipToTracker": of one whose sensors have names
 };
 
 // A missing file gives the defaults; so does a damaged one, with the reason in `warning`, a whole

@@ -202,15 +202,17 @@ void SetupGuide::observe(const TrackerReading& reading,
                          double now_s) {
     if (!recording_ || reading.in_mannequin || reading.sequence == last_sequence_) return;
     last_sequence_ = reading.sequence;
-    const int index = step_ == SetupStep::needle ? assignment.needle : assignment.probe;
+    const SensorAssignment places = places_of(reading, assignment);
+    const int index = step_ == SetupStep::needle ? places.needle : places.probe;
     if (index < 0 || index >= reading.sensor_count) return;
     const SensorReading& sensor = reading.sensors[index];
     if (sensor.in_mannequin) return;
+    const std::optional<Rigid> placed = sensor_pose(reading, places, index);
     Pose pose;
     pose.frame = static_cast<std::int64_t>(reading.sequence);
     pose.timestamp_s = sensor.time_s >= 0 ? sensor.time_s : reading.time_s;
-    pose.ok = sensor.state == SensorState::ok;
-    pose.tracker_from_tool = sensor.world_from_sensor;
+    pose.ok = sensor.state == SensorState::ok && placed;
+    if (placed) pose.tracker_from_tool = *placed;
     std::vector<Pose>& poses = poses_of(step_);
     // What another sensor's message brought along again is no reading of this one.
     if (sensor.time_s >= 0 && !poses.empty() && poses.back().timestamp_s == pose.timestamp_s)

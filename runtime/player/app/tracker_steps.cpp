@@ -18,6 +18,65 @@ void forget_tracker(TrackerInUse& tracker) {
     tracker.paced.reset();
 }
 
+const char* role_name(ToolOf role) {
+    return role == ToolOf::probe ? "probe" : role == ToolOf::needle ? "needle" : "reference";
+}
+
+const std::vector<std::string>& tools_in_use(const PlayerState& player) {
+    return player.arguments.tools.empty() ? player.settings.tools : player.arguments.tools;
+}
+
+SensorAssignment sensors_in_use(const PlayerState& player, const TrackerInUse& tracker) {
+    const Settings& s = player.settings;
+    const std::string prefix = tracker.spec.substr(0, tracker.spec.find(':'));
+    const auto kinds = tracker_kinds();
+    const bool named = std::any_of(kinds.begin(), kinds.end(), [&](const TrackerKind& kind) {
+        return kind.names_sensors && prefix == kind.prefix;
+    });
+    const Result<ToolNames> tools = parse_tool_names(tools_in_use(player));
+    const SensorAssignment numbers{s.probe_sensor, s.needle_sensor, s.reference_sensor};
+    // What the set-up keeps by name is of trackers with names alone.
+    if (!named && player.arguments.tools.empty()) return numbers;
+    return assignment_of(tools ? *tools : ToolNames{}, named ? SensorAssignment{} : numbers);
+}
+
+void give_role(PlayerState& player,
+               CaseState& loaded,
+               const TrackerInUse& tracker,
+               const std::vector<std::string>& sensors,
+               int sensor,
+               ToolOf role) {
+    Settings& s = player.settings;
+    const auto at = static_cast<std::size_t>(sensor);
+    const std::string name = at < sensors.size() ? sensors[at] : "";
+    if (name.empty()) {
+        // By number: what the command line said of it holds no longer.
+        const SensorAssignment now = sensors_in_use(player, tracker);
+        s.probe_sensor = now.probe;
+        s.needle_sensor = now.needle;
+        s.reference_sensor = now.reference;
+        player.arguments.tools.clear();
+        int* const of_role[] = {&s.probe_sensor, &s.needle_sensor, &s.reference_sensor};
+        int& wanted = *of_role[static_cast<std::size_t>(role)];
+        const bool had = wanted == sensor;
+        for (int* other : of_role) {
+            if (*other == sensor) *other = -1;
+        }
+        if (!had) wanted = sensor;
+        return;
+    }
+    const std::string given = std::string(role_name(role)) + "=";
+    std::vector<std::string> tools = tools_in_use(player);
+    const bool had = std::find(tools.begin(), tools.end(), given + name) != tools.end();
+    std::erase_if(tools, [&](const std::string& tool) {
+        return tool.rfind(given, 0) == 0 || tool.substr(tool.find('=') + 1) == name;
+    });
+    if (!had) tools.push_back(given + name);
+    s.tools = tools;
+    player.arguments.tools.clear();
+    if (const Result<ToolNames> parsed = parse_tool_names(tools)) loaded.scan->set_tools(*parsed);
+}
+
 void choose_tracker(PlayerState& player,
                     CaseState& loaded,
                     TrackerInUse& tracker,
@@ -34,7 +93,7 @@ void choose_tracker(PlayerState& player,
     }
     Result<std::unique_ptr<Tracker>> made =
         make_case_tracker(spec, *loaded.skin, loaded.exercise(), loaded.set_up.calibrations,
-                          player.arguments.tools, session_clock(player.clock_start_s));
+                          tools_in_use(player), session_clock(player.clock_start_s));
     if (!made) {
         player.notices.error(made.error().message());
         choose_tracker(player, loaded, tracker, "mouse");

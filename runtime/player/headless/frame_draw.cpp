@@ -84,6 +84,11 @@ void place_needle(const DatasetRecipe& r, const Exercise& exercise, Draw& draw, 
     if (!input.has_needle) return;
     input.needle.tip = input.mannequin_from_probe * tip;
     input.needle.direction = normalized(input.mannequin_from_probe.rotation * axis);
+    // The bevel faces the probe, as far as it can.
+    const Vector3 d = input.needle.direction;
+    const Vector3 up = -1 * input.mannequin_from_probe.rotation.column(2);
+    const Vector3 across = up - dot(up, d) * d;
+    input.needle.bevel = norm(across) > 1e-6 ? normalized(across) : any_perpendicular(d);
 }
 
 }  // namespace

@@ -36,6 +36,7 @@
 #include "runtime/player/session/open_case.h"
 #include "runtime/player/session/session_run.h"
 #include "runtime/recording/session_words.h"
+#include "runtime/tracking/devices/make_tracker.h"
 
 namespace sonocase::runtime::inline player_headless {
 
@@ -275,6 +276,7 @@ class HeadlessRun {
     const Exercise* exercise_ = nullptr;
     std::uint64_t seed_ = 0;  // of the attempt
     Calibrations calibrations_;
+    SensorAssignment assignment_;
     std::optional<ScanEngine> engine_;
     std::unique_ptr<Skin> skin_;
     std::string spec_;  // of the tracker
@@ -356,6 +358,9 @@ Status HeadlessRun::set_up_tracker() {
         std::unique_ptr<Tracker> made,
         make_case_tracker(spec_, *skin_, *exercise_, calibrations_, arguments_.tools, clock_));
     tracker_ = std::move(made);
+    SONOCASE_TRY(const ToolNames tools, parse_tool_names(arguments_.tools));
+    assignment_ = assignment_of(tools, {});
+    engine_->set_assignment(assignment_);
     tracker_->set_wake([this] { reading_arrived_.notify(); });
     frames_ = frame_count(arguments_, *tracker_);
     return Done{};
@@ -475,7 +480,7 @@ Status HeadlessRun::render(int i, double now_s) {
         if (!doppler_->has_flow() && settings_.doppler.mode != DopplerMode::m_mode)
             warn("The bundle has no flow, so that Doppler modes show none; cook the case again.");
         if (!replay_)
-            doppler_->aim(tool_poses(reading_, calibrations_, {}).mannequin_from_probe,
+            doppler_->aim(tool_poses(reading_, calibrations_, assignment_).mannequin_from_probe,
                           {!arguments_.box_given, !arguments_.gate_given, !arguments_.angle_given,
                            !arguments_.steer_given},
                           settings_.doppler);

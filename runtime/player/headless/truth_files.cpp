@@ -28,8 +28,11 @@ Json pose_json(const Rigid& pose) {
 }
 
 // A pose whose z is the needle's axis; x and y are any.
+// x: the side that the bevel faces.
 Json needle_json(const NeedlePose& needle) {
-    const Vector3 x = any_perpendicular(needle.direction);
+    const bool known =
+        norm(needle.bevel) > 0.5 && std::abs(dot(needle.bevel, needle.direction)) < 1e-6;
+    const Vector3 x = known ? needle.bevel : any_perpendicular(needle.direction);
     return pose_json({Matrix3::from_columns(x, cross(needle.direction, x), needle.direction),
                       needle.tip - Point3{}});
 }

@@ -59,6 +59,7 @@ struct ScanFrame {
     std::array<EffectCost, kMaxEffects> costs{};
     int cost_count = 0;
     SensorVerdict probe_verdict = SensorVerdict::absent, needle_verdict = SensorVerdict::absent;
+    SensorVerdict reference_verdict = SensorVerdict::absent;
     double rendered_s = 0;  // when finished, session clock
     double frame_ms = 0;
     bool waiting = false;  // for the first reading of the tracker: the picture is black

@@ -107,14 +107,16 @@ void draw_status(const ImagePlace& place, const ScanFrame& frame) {
     };
     const bool no_probe = !frame.frozen && out_of_view(frame.probe_verdict);
     const bool no_needle = !frame.frozen && out_of_view(frame.needle_verdict);
-    const bool nothing = frame.waiting || no_probe || no_contact || held;
+    const bool no_reference = !frame.frozen && out_of_view(frame.reference_verdict);
+    const bool nothing = frame.waiting || no_probe || no_reference || no_contact || held;
     if (!nothing && !no_needle && !frame.record.skin_not_fitted) return;
-    const char* words = frame.waiting ? tr("No reading from the tracker yet")
-                        : no_probe    ? tr("Probe out of view: picture held")
-                        : no_contact  ? tr("No contact: press the probe onto the skin")
-                        : held        ? tr("Pose is not usable: picture held")
-                        : no_needle   ? tr("Needle out of view")
-                                      : tr("Not fitted here: the mannequin was not swept");
+    const char* words = frame.waiting  ? tr("No reading from the tracker yet")
+                        : no_probe     ? tr("Probe out of view: picture held")
+                        : no_reference ? tr("Reference out of view: picture held")
+                        : no_contact   ? tr("No contact: press the probe onto the skin")
+                        : held         ? tr("Pose is not usable: picture held")
+                        : no_needle    ? tr("Needle out of view")
+                                       : tr("Not fitted here: the mannequin was not swept");
     const ImVec2 wide = ImGui::CalcTextSize(words);
     // Over a picture of tissue the words are at its bottom.
     const float height = nothing ? 0.55f : 0.93f;

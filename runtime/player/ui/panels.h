@@ -8,10 +8,12 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "runtime/player/app/case_steps.h"
 #include "runtime/player/app/states.h"
+#include "runtime/player/app/tracker_steps.h"
 #include "runtime/player/ui/image_view.h"
 #include "runtime/player/ui/parts/ui.h"
 
@@ -157,19 +159,19 @@ void draw_setup_drawing(Ui& ui, const Box& box, SetupStep step);
 struct SetupPageInput {
     const TrackerHealth& tracker;
     const TrackerReading& reading;  // the newest
-    bool live;                      // false: no readings arrive, what there are is old
+    const SensorAssignment& assignment;
+    bool live;  // false: no readings arrive, what there are is old
     const Calibrations& calibrations;
     const ImageTexture& picture;  // of the newest frame, for the last step
     int width_px, height_px;      // its size
 };
 struct SetupRequest {
     bool save = false, close = false;
+    std::optional<std::pair<int, ToolOf>> role;  // to give to a sensor, see give_role()
 };
-// Changes the assignment of sensors.
 SetupRequest draw_setup_page(Ui& ui,
                              Notices& notices,
                              SetupGuide& guide,
-                             SensorAssignment& assignment,
                              const SetupPageInput& input);
 
 }  // namespace sonocase::runtime::inline player_ui

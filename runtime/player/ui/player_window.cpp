@@ -49,18 +49,22 @@ void PlayerWindow::follow_session() {
 }
 
 void PlayerWindow::show_setup(const TrackerHealth& tracker) {
-    SensorAssignment& assignment = scan_.console.controls.assignment;
+    const SensorAssignment& assignment = scan_.console.controls.assignment;
     SetUp& set_up = loaded_.set_up;
     follow_setup(loaded_, assignment, player_.now_s);
     const SetupRequest wanted =
-        draw_setup_page(ui_, player_.notices, *set_up.guide, assignment,
+        draw_setup_page(ui_, player_.notices, *set_up.guide,
                         {.tracker = tracker,
                          .reading = loaded_.frame().reading,
+                         .assignment = assignment,
                          .live = tracker_is_live(loaded_, scan_.tracker, tracker),
                          .calibrations = set_up.calibrations,
                          .picture = *view_.display.texture,
                          .width_px = loaded_.frame().width_px,
                          .height_px = loaded_.frame().height_px});
+    if (wanted.role)
+        give_role(player_, loaded_, scan_.tracker, tracker.sensors, wanted.role->first,
+                  wanted.role->second);
     const bool saved =
         wanted.save && save_calibrations(set_up.calibrations, player_.settings, player_.notices);
     if (wanted.close || saved) view_.screen.show_setup = false;

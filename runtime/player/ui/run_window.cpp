@@ -39,7 +39,6 @@ void apply_settings(const Settings& settings, ScanControls& controls) {
     controls.settings.gain_db = settings.gain_db;
     controls.settings.dynamic_range_db = settings.dynamic_range_db;
     for (std::size_t i = 0; i < 8; ++i) controls.settings.tgc_db[i] = settings.tgc_db[i];
-    controls.assignment = {settings.probe_sensor, settings.needle_sensor};
 }
 
 void report(const Status& done) {
@@ -287,6 +286,7 @@ void PlayerWindow::show_picture(const PictureClock& clock) {
     feed_mouse(scan_.tracker, steady_seconds() - player_.clock_start_s);
     console.controls.resting =
         view.screen.page != Page::scan && !scan_.training.attempt && !scan_.servers.igtl;
+    console.controls.assignment = sensors_in_use(player_, scan_.tracker);
     if (loaded.open) loaded.scan->set_controls(console.controls);
 
     ++shown_;
@@ -316,8 +316,6 @@ void PlayerWindow::keep_settings() {
     s.gain_db = controls.settings.gain_db;
     s.dynamic_range_db = controls.settings.dynamic_range_db;
     for (std::size_t i = 0; i < 8; ++i) s.tgc_db[i] = controls.settings.tgc_db[i];
-    s.probe_sensor = controls.assignment.probe;
-    s.needle_sensor = controls.assignment.needle;
     if (player_.arguments.tracker.empty()) s.tracker = scan_.tracker.spec;
     if (!player_.settings_file.empty()) report(save_settings(s, player_.settings_file));
 }

@@ -193,24 +193,59 @@ void draw_step_tabs(Ui& ui, const Box& row, SetupGuide& guide) {
     }
 }
 
-// Which sensor a tool carries, and where that one is now.
-void draw_sensor(Ui& ui, Box& room, const char* tool, int& index, const SetupPageInput& input) {
-    if (room.h < 44) return;
-    const int count = std::max(input.reading.sensor_count, 2);
-    const std::string name = index < 0 ? tr("none") : filled("Sensor %d", index + 1);
-    const int by = ui.stepper(tool, room.take_top(44, room.h > 70 ? 0 : 8), tr(tool), name,
-                              "Another sensor of the tracker");
-    if (by != 0) index = std::clamp(index + by, -1, count - 1);
-    const bool there = input.live && index >= 0 && index < input.reading.sensor_count &&
-                       input.reading.sensors[index].state != SensorState::absent &&
-                       input.reading.sensors[index].state != SensorState::lost;
-    std::string where = tr("no readings");
-    if (there) {
-        const Vector3 t = input.reading.sensors[index].world_from_sensor.translation;
-        where = filled("%.1f  %.1f  %.1f mm", t.x, t.y, t.z);
+// The sensors that were heard, by their names or numbers, and which tool each is on: one row and
+// three buttons per sensor.
+std::optional<std::pair<int, ToolOf>> draw_roles(Ui& ui, Box& room, const SetupPageInput& input) {
+    struct Column {
+        ToolOf role;
+        const char* words;
+        int sensor;
+    };
+    const SensorAssignment places = places_of(input.reading, input.assignment);
+    const Column columns[] = {{ToolOf::probe, "Probe", places.probe},
+                              {ToolOf::needle, "Needle", places.needle},
+                              {ToolOf::reference, "Reference", places.reference}};
+    std::optional<std::pair<int, ToolOf>> given;
+    const TrackerHealth& tracker = input.tracker;
+    constexpr float kRow = 62;
+    const int count = std::clamp(input.reading.sensor_count, 2, kMaxSensors);
+    int left_out = 0;
+    for (int i = 0; i < count; ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        const bool named = at < tracker.sensors.size() && !tracker.sensors[at].empty();
+        // A place that a tracker with names keeps free.
+        if (!tracker.sensors.empty() && !named) continue;
+        if (room.h < kRow) {
+            ++left_out;
+            continue;
+        }
+        const SensorReading& sensor = input.reading.sensors[at];
+        const bool there = input.live && i < input.reading.sensor_count &&
+                           sensor.state != SensorState::absent && sensor.state != SensorState::lost;
+        Box line = room.take_top(24);
+        const Vector3 t = sensor.world_from_sensor.translation;
+        const std::string where =
+            there ? filled("%.0f  %.0f  %.0f mm", t.x, t.y, t.z) : std::string(tr("no readings"));
+        ui.text(line.take_right(ui.width(where, Type::small) + 4, 6), where, Type::small,
+                there ? colour::kDim : colour::kFaint, Align::right, true);
+        ui.text(line, named ? tracker.sensors[at] : filled("Sensor %d", i + 1), Type::small,
+                there ? colour::kText : colour::kDim, Align::left, true);
+        const Box row = room.take_top(30, 8);
+        for (int c = 0; c < 3; ++c) {
+            ButtonStyle style;
+            style.chosen = columns[c].sensor == i;
+            style.may_cut = true;
+            style.tip = "Which tool this sensor is on; the reference is fixed to the mannequin";
+            const std::string id =
+                std::string(role_name(columns[c].role)) + "-" + std::to_string(i + 1);
+            if (ui.button(id.c_str(), row.column(c, 3, 4), tr(columns[c].words), style))
+                given = {i, columns[c].role};
+        }
     }
-    ui.text(room.take_top(22, 8), where, Type::small, there ? colour::kText : colour::kDim,
-            Align::right, true);
+    if (left_out > 0 && room.h > 20)
+        ui.text(room.take_top(20), filled("%d more: make the window taller", left_out), Type::small,
+                colour::kDim, Align::left, true);
+    return given;
 }
 
 void draw_tracker_words(Ui& ui, Box& room, const SetupPageInput& input) {
@@ -421,17 +456,13 @@ void draw_step(Ui& ui, Box room, SetupGuide& guide, const SetupPageInput& input)
 }
 
 // The right column: sensors, what was found, or how good the readings are.
-void draw_side(Ui& ui,
-               Box room,
-               SetupGuide& guide,
-               SensorAssignment& assignment,
-               const SetupPageInput& input) {
+void draw_side(
+    Ui& ui, Box room, SetupGuide& guide, const SetupPageInput& input, SetupRequest& request) {
     if (input.reading.in_mannequin) return;
     switch (guide.step()) {
         case SetupStep::trackers:
             draw_tracker_words(ui, room, input);
-            draw_sensor(ui, room, "Probe", assignment.probe, input);
-            draw_sensor(ui, room, "Needle", assignment.needle, input);
+            request.role = draw_roles(ui, room, input);
             break;
         case SetupStep::done: draw_summary(ui, room, input.calibrations); break;
         default: draw_measure(ui, room, guide);
@@ -513,7 +544,6 @@ bool draw_foot(Ui& ui, Box foot, SetupGuide& guide, const SetupPageInput& input)
 SetupRequest draw_setup_page(Ui& ui,
                              Notices& notices,
                              SetupGuide& guide,
-                             SensorAssignment& assignment,
                              const SetupPageInput& input) {
     SetupRequest request;
     const Box window = ui.window();
@@ -532,11 +562,11 @@ SetupRequest draw_setup_page(Ui& ui,
     if (content.w > 560) {
         const Box side = content.take_right(content.w > 800 ? 312 : 0.48f * content.w, 16);
         ui.card(side, "measure");
-        draw_side(ui, side.inset(16, 12), guide, assignment, input);
+        draw_side(ui, side.inset(16, 12), guide, input, request);
     } else {
         const Box side = content.take_bottom(0.5f * content.h, 8);
         ui.card(side, "measure");
-        draw_side(ui, side.inset(16, 12), guide, assignment, input);
+        draw_side(ui, side.inset(16, 12), guide, input, request);
     }
     ui.card(content, "step");
     draw_step(ui, content.inset(16, 12), guide, input);

@@ -161,14 +161,15 @@ std::optional<std::string> draw_tracker_panel(const TrackerPanelInput& input) {
     draw_health(input.health);
     const ScanFrame& frame = input.frame;
     const TrackerReading& reading = frame.reading;
-    const SensorAssignment assignment =
-        reading.in_mannequin ? SensorAssignment{} : input.assignment;
+    const SensorAssignment assignment = places_of(reading, input.assignment);
     const auto sensor = [&](int index) -> const SensorReading* {
         if (index < 0 || index >= reading.sensor_count) return nullptr;
         return &reading.sensors[index];
     };
     sensor_row("Probe", sensor(assignment.probe), frame.probe_verdict);
     sensor_row("Needle", sensor(assignment.needle), frame.needle_verdict);
+    if (assignment.reference >= 0)
+        sensor_row("Reference", sensor(assignment.reference), frame.reference_verdict);
     ImGui::Separator();
     draw_calibrations(input.calibrations, reading.in_mannequin);
     return chosen;

@@ -11,7 +11,15 @@ Millimetres, seconds, radians; right-handed frames; poses are 4 x 4 arrays `mann
 `sonocase.Error` with one line that says what, where and what was expected.
 """
 
+import numpy as _numpy
+
 from . import _core
+
+if int(_numpy.__version__.split(".")[0]) >= _core._NUMPY_END:
+    raise ImportError(f"sonocase was built for NumPy below {_core._NUMPY_END}, and this is "
+                      f"{_numpy.__version__}: pip install 'numpy<{_core._NUMPY_END}', or build the "
+                      "package with pybind11 2.12 or later")
+
 from . import pose as Pose
 from ._core import (
     Case,

@@ -11,7 +11,8 @@ from . import pose as Pose
 __version__: str
 
 Path = Union[str, "os.PathLike[str]"]
-# Rigid motions, 4 x 4, mm. A needle: mannequin_from_needle, or (tip, direction).
+# Rigid motions, 4 x 4, mm. A needle: mannequin_from_needle (z from hub to tip, x to the side that
+# its bevel faces), or (tip, direction), where the bevel faces the probe.
 PoseArray = npt.ArrayLike
 NeedleArray = Union[npt.ArrayLike, tuple[npt.ArrayLike, npt.ArrayLike], None]
 

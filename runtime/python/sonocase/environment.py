@@ -7,7 +7,8 @@
 
 Follows the interface of Gymnasium (Farama Foundation): where it is installed, the classes are a
 `gymnasium.Env` and a `gymnasium.vector.VectorEnv` and take its wrappers; otherwise they stand alone,
-with spaces of the same members. `reset(seed=n)` begins the same episode again; `reset()` goes on and
+with spaces of the same members, and `gymnasium.make("sonocase/reach-target-v0", case=PATH)` knows
+the tasks once this module is imported. `reset(seed=n)` begins the same episode again; `reset()` goes on and
 draws another, the first with the `seed` of the constructor.
 
 Tasks, and their actions (numbers from -1 to 1, each a part of the greatest step):
@@ -20,13 +21,14 @@ Tasks, and their actions (numbers from -1 to 1, each a part of the greatest step
                   and shift along the probe's face. Bring the tip to the target.
 
 The observation is the picture: uint8 (height, width). `info` holds `contact` (share of beams that
-touch the skin), `facts` (Renderer.truth) and, where asked for, `planes`.
+touch the skin), `facts` (Renderer.truth, None where that has NaN, which is not equal to itself) and,
+where asked for, `planes`.
 """
 
 import numpy as np
 
 from . import pose as _pose
-from ._core import Renderer
+from ._core import Case, Renderer
 
 try:
     import gymnasium as _gymnasium
@@ -67,6 +69,14 @@ class Box:
     def contains(self, x):
         x = np.asarray(x)
         return x.shape == self.shape and bool(np.all((x >= self.low) & (x <= self.high)))
+
+
+def _comparable(fact):
+    if isinstance(fact, dict):
+        return {name: _comparable(value) for name, value in fact.items()}
+    if isinstance(fact, list):
+        return [_comparable(value) for value in fact]
+    return None if isinstance(fact, float) and fact != fact else fact
 
 
 def _box(low, high, shape, dtype):
@@ -169,7 +179,7 @@ class _Episode:
 class VectorEnvironment(_VectorEnv):
     """Many environments that step together, their frames rendered on `threads` threads.
 
-    cases     a Case or a list of cases, which take turns
+    cases     a Case or its path, or a list of them, which take turns
     count     environments
     planes    names of truth planes for `info["planes"]`; see Renderer.truth
     longest   steps of an episode before it is cut off
@@ -185,6 +195,7 @@ class VectorEnvironment(_VectorEnv):
     def __init__(self, cases, task="find-view", count=1, *, exercise=None, size=(128, 128), seed=0,
                  threads=1, longest=200, planes=(), model="", machine=""):
         cases = list(cases) if isinstance(cases, (list, tuple)) else [cases]
+        cases = [c if isinstance(c, Case) else Case.open(c) for c in cases]
         self.num_envs, self.threads, self.planes = int(count), threads, list(planes)
         if self.num_envs < 1:
             raise ValueError("count: give at least one")
@@ -251,7 +262,7 @@ class VectorEnvironment(_VectorEnv):
                 threads=self.threads, truth=self.planes)
             self._pictures[mine] = pictures
             for i, n in enumerate(mine):
-                facts[n] = said[i]
+                facts[n] = _comparable(said[i])
                 planes[n] = {name: getattr(truth, name)[i] for name in self.planes}
         return {"facts": facts, "planes": planes,
                 "contact": np.array([f["contact"] for f in facts])}
@@ -297,3 +308,9 @@ class Environment(_Env):
 
     def close(self):
         self._all.close()
+
+
+if _Env is not object:
+    for _task in TASKS:
+        _gymnasium.register(id=f"sonocase/{_task}-v0", kwargs={"task": _task},
+                            entry_point="sonocase.environment:Environment")

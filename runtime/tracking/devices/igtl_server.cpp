@@ -80,8 +80,10 @@ void IgtlServer::run() {
     std::array<std::uint8_t, 4096> ignored;
     bool published = false;
     while (!stop_) {
+        // Those who connect without end do not hold up those who are there.
+        std::size_t accepted = 0;
         for (Socket client = listener_.accept(clients.empty() ? 0.05 : 0.002); client.open();
-             client = listener_.accept(0)) {
+             client = ++accepted < kMaxClients ? listener_.accept(0) : Socket()) {
             if (clients.size() >= kMaxClients) continue;
             clients.push_back({std::move(client), {}, 0});
             // It gets the frame that is shown now: the next one may come much later.

@@ -7,6 +7,8 @@
 #include <chrono>
 #include <utility>
 
+#include <time.h>
+
 #include "formats/recording/tool_frames.h"
 #include "formats/text/number_text.h"
 
@@ -15,6 +17,15 @@ namespace {
 
 constexpr double kNearMm = 10;  // no tracker measures a probe for long so near to its own origin
 constexpr int kSlowPoses = 5;
+// A sender of 250 readings a second of four tools takes half a hundredth of a core.
+constexpr double kMostOfACore = 0.1;
+constexpr double kWakeEveryS = 0.002;
+
+double thread_seconds() {
+    timespec t{};
+    ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
 
 bool to_mannequin(const std::string& name) {
     return split_transform_name(name).to == "Mannequin";
@@ -63,6 +74,54 @@ void IgtlTracker::set_wake(std::function<void()> wake) {
     wake_ = std::move(wake);
 }
 
+void IgtlTracker::set_tools(const ToolNames& tools) {
+    const std::lock_guard lock(mutex_);
+    wanted_tools_ = tools;
+    tools_changed_ = true;
+}
+
+// Whatever a sender does, its thread takes no more than a tenth of a core from the picture's: what
+// comes faster than it can be read with that waits at the sender.
+void IgtlTracker::pay() {
+    const double now_s = clock_(), spent_s = thread_seconds();
+    constexpr double kSavedS = 0.02;
+    if (paid_s_ >= 0) {
+        credit_s_ = std::min(credit_s_ + kMostOfACore * (now_s - paid_s_), kSavedS);
+        credit_s_ -= spent_s - spent_before_s_;
+    }
+    paid_s_ = now_s;
+    spent_before_s_ = spent_s;
+    if (credit_s_ >= 0) return;
+    const double rest_s = std::min(-credit_s_ / kMostOfACore, 0.05);
+    std::this_thread::sleep_for(std::chrono::duration<double>(rest_s));
+}
+
+// Tells who waits for poses, and not more often than a picture could follow.
+void IgtlTracker::wake(double now_s) {
+    if (!to_wake_ || now_s - woken_s_ < kWakeEveryS) return;
+    to_wake_ = false;
+    woken_s_ = now_s;
+    const std::lock_guard lock(mutex_);
+    if (wake_) wake_();
+}
+
+// Names that were heard take their places anew.
+void IgtlTracker::take_tools() {
+    const std::lock_guard lock(mutex_);
+    if (!tools_changed_) return;
+    tools_changed_ = false;
+    options_.tools = wanted_tools_;
+    forget_sensors();
+}
+
+void IgtlTracker::forget_sensors() {
+    const std::uint64_t sequence = reading_.sequence;
+    reading_ = {};
+    reading_.sequence = sequence;
+    std::fill(names_.begin(), names_.end(), std::string());
+    heard_.poses = {};
+}
+
 void IgtlTracker::set_health(TrackerPhase phase, const Message& message) {
     const std::lock_guard lock(mutex_);
     health_.phase = phase;
@@ -75,6 +134,7 @@ void IgtlTracker::run() {
                                             {std::to_string(port())})
                                   : "Looking for a server.");
     while (!stop_) {
+        pay();
         if (options_.listening) {
             Socket client = listener_.accept(0.1);
             while (client.open()) client = converse(std::move(client));
@@ -98,10 +158,8 @@ Socket IgtlTracker::converse(Socket socket) {
         const std::lock_guard lock(mutex_);
         ++health_.connects;
     }
-    reading_ = {};
-    reference_ = {};
     heard_ = {};
-    std::fill(names_.begin(), names_.end(), std::string());
+    forget_sensors();
     last_s_ = -1;
     igtl::MessageReader reader;
     std::array<std::uint8_t, 16384> buffer;
@@ -110,9 +168,11 @@ Socket IgtlTracker::converse(Socket socket) {
     Socket waiting;
     Message ended = "The other side closed the connection.";
     while (!stop_) {
-        const long n = socket.read(buffer, 0.1);
+        pay();
+        const long n = socket.read(buffer, to_wake_ ? kWakeEveryS : 0.1);
         if (n < 0) break;
         const double now_s = clock_();
+        wake(now_s);
         explain(now_s);
         if (options_.listening && now_s - looked_s > 0.1) {
             looked_s = now_s;
@@ -179,8 +239,10 @@ Socket IgtlTracker::converse(Socket socket) {
                 }
             }
         }
+        wake(clock_());
         if (!socket.open()) break;
     }
+    wake(clock_() + kWakeEveryS);
     set_health(TrackerPhase::searching, ended);
     return waiting;
 }
@@ -229,6 +291,16 @@ Message IgtlTracker::what_came(double now_s) const {
     for (std::size_t i = 2; i < heard_.poses.size(); ++i) {
         if (heard_.poses[i] > heard_.poses[most]) most = i;
     }
+    if (most > 0) {
+        const TransformName name = split_transform_name(names_[most]);
+        const std::string turned = std::string(name.to) + "To" + std::string(name.from);
+        if ((name.from == "Tracker" || name.from == "Reference") &&
+            (rank_as_tool(turned, ToolRole::probe) > 0 ||
+             rank_as_tool(turned, ToolRole::needle) > 0))
+            return {
+                "{} is the inverse of a tool's pose; send the tool's own, such as ProbeToTracker.",
+                {names_[most]}};
+    }
     if (most > 0)
         return {
             "{} transforms {} came, none of a probe; send ProbeTo..., TransducerTo... or "
@@ -241,6 +313,9 @@ Message IgtlTracker::what_came(double now_s) const {
         return {
             "The needle's pose comes and none of the probe; send ProbeTo..., TransducerTo... "
             "or ImageTo... as well."};
+    if (reading_.sensors[kReferenceSensor].state != SensorState::absent && relative_to_reference())
+        return "The reference's pose comes and none of the probe; send ProbeTo..., TransducerTo... "
+               "or ImageTo... as well.";
     if (heard_.others > 0)
         return {
             "{} messages came, none with a pose; the last is of type {}. Send TRANSFORM or "
@@ -284,24 +359,27 @@ int IgtlTracker::known_sensor(const std::string& name) const {
     return -1;
 }
 
+int IgtlTracker::take_place(int sensor, const std::string& name) {
+    names_[sensor] = name;
+    heard_.poses[static_cast<std::size_t>(sensor)] = 0;
+    const std::lock_guard lock(mutex_);
+    health_.sensors = names_;
+    return sensor;
+}
+
 int IgtlTracker::sensor_of(const std::string& name) {
     if (const int known = known_sensor(name); known >= 0) return known;
     const int wanted = plays("probe", name)    ? kProbeSensor
                        : plays("needle", name) ? kNeedleSensor
                                                : -1;
-    const auto take_place = [&](int i) {
-        names_[i] = name;
-        heard_.poses[i] = 0;
-        return i;
-    };
     // The probe itself is preferred to its image, and the mannequin to other frames.
     const ToolRole role = wanted == kNeedleSensor ? ToolRole::needle : ToolRole::probe;
     const bool gives_way =
         wanted >= 0 && rank_as_tool(names_[wanted], role) < rank_as_tool(name, role);
-    if (wanted >= 0 && (names_[wanted].empty() || gives_way)) return take_place(wanted);
+    if (wanted >= 0 && (names_[wanted].empty() || gives_way)) return take_place(wanted, name);
     // The sensors of named tools are kept free for them.
-    for (int i = 2; i < kMaxSensors; ++i) {
-        if (names_[i].empty()) return take_place(i);
+    for (int i = relative_to_reference() ? kReferenceSensor + 1 : 2; i < kMaxSensors; ++i) {
+        if (names_[i].empty()) return take_place(i, name);
     }
     return -1;
 }
@@ -349,7 +427,7 @@ void IgtlTracker::note(const igtl::NamedPose& pose) {
 
 void IgtlTracker::take(const std::vector<igtl::NamedPose>& poses, double device_time_s) {
     const double now_s = clock_();
-    constexpr double kReferenceS = 0.25;  // as long as a tool may be silent
+    take_tools();
     const auto put = [&](SensorReading& sensor, const igtl::NamedPose& pose) {
         sensor.time_s = now_s;
         sensor.state = pose.fault == igtl::PoseFault::none ? SensorState::ok : SensorState::lost;
@@ -360,12 +438,12 @@ void IgtlTracker::take(const std::vector<igtl::NamedPose>& poses, double device_
     for (const igtl::NamedPose& pose : poses) {
         if (!plays("reference", pose.name)) continue;
         note(pose);
-        put(reference_, pose);
+        if (names_[kReferenceSensor] != pose.name) take_place(kReferenceSensor, pose.name);
+        // Handed on with the next pose of a tool.
+        put(reading_.sensors[kReferenceSensor], pose);
+        reading_.sensor_count = std::max(reading_.sensor_count, kReferenceSensor + 1);
     }
-    const bool relative = relative_to_reference();
-    const bool referenced = !relative || (reference_.state == SensorState::ok &&
-                                          now_s - reference_.time_s <= kReferenceS);
-    for (igtl::NamedPose pose : poses) {
+    for (const igtl::NamedPose& pose : poses) {
         if (plays("reference", pose.name)) continue;
         note(pose);
         const bool good = pose.fault == igtl::PoseFault::none;
@@ -377,11 +455,7 @@ void IgtlTracker::take(const std::vector<igtl::NamedPose>& poses, double device_
             ++heard_.poses[static_cast<std::size_t>(i)];
             if (i == kProbeSensor) note_probe(pose, now_s);
         }
-        // What ends in the reference already is left as it is.
-        if (!sensor.in_mannequin && relative && !ends_in_reference(pose.name)) {
-            pose.to_from = inverse(reference_.world_from_sensor) * pose.to_from;
-            if (!referenced) pose.fault = igtl::PoseFault::lost;
-        }
+        sensor.in_reference = ends_in_reference(pose.name);
         put(sensor, pose);
         reading_.sensor_count = std::max(reading_.sensor_count, i + 1);
         any = true;
@@ -408,7 +482,7 @@ void IgtlTracker::take(const std::vector<igtl::NamedPose>& poses, double device_
         health_.rate_hz = 1 / mean_period_s_;
     }
     last_s_ = now_s;
-    if (wake_) wake_();
+    to_wake_ = true;
 }
 
 }  // namespace sonocase::runtime::inline tracking_devices

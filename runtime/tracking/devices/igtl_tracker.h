@@ -35,12 +35,15 @@ struct IgtlTrackerOptions {
 
 // A device's name says which tool it is, as in recordings (formats/recording/tool_frames.h); others
 // take the next free sensors in order. The pose of a name that ends in ToMannequin is that of the
-// tool in `mannequin`. With a transform for the role `reference`, all others are taken relative to
-// it. A SENSOR message of device ProbeForce gives the newtons on the probe's face, which come with
-// the next pose.
+// tool in `mannequin`. A transform for the role `reference` is the sensor kReferenceSensor. A
+// SENSOR message of device ProbeForce gives the newtons on the probe's face, which come with the
+// next pose.
 //
 // A listening tracker hears one program at a time: a second one is refused while the first sends,
 // and health() says so.
+//
+// A sender that floods is read with at most a tenth of a core, and wakes the picture at most 500
+// times a second; what it sends is kept in at most 2 MB and 16 names.
 //
 // Each sensor keeps the time of its own last pose. One whose sender calls it invalid, or sends no
 // numbers for it, is lost.
@@ -52,6 +55,7 @@ class IgtlTracker final : public Tracker {
     bool poll(double now_s, TrackerReading& reading) override;
     TrackerHealth health() const override;
     void set_wake(std::function<void()> wake) override;
+    void set_tools(const ToolNames& tools) override;
     bool is_device() const override { return true; }
     int port() const { return listener_.open() ? listener_.port() : options_.port; }
 
@@ -60,8 +64,13 @@ class IgtlTracker final : public Tracker {
     void run();
     // Returns the program that waits for this one's end, if there is one.
     Socket converse(Socket socket);
+    void pay();
+    void wake(double now_s);
+    void forget_sensors();
+    void take_tools();
     void take(const std::vector<igtl::NamedPose>& poses, double device_time_s);
     int sensor_of(const std::string& name);
+    int take_place(int sensor, const std::string& name);
     int known_sensor(const std::string& name) const;  // -1: none yet
     bool plays(const std::string& role, const std::string& name) const;
     bool relative_to_reference() const;
@@ -93,11 +102,15 @@ class IgtlTracker final : public Tracker {
     TrackerReading reading_;
     std::vector<std::string> names_;  // # sensors; empty: the sensor is free
     Heard heard_;
-    SensorReading reference_;  // absent: none has come
     mutable std::mutex mutex_;
     TrackerHealth health_;
+    ToolNames wanted_tools_;
+    bool tools_changed_ = false;
     std::function<void()> wake_;
     double last_s_ = -1, mean_period_s_ = 0;
+    bool to_wake_ = false;
+    double woken_s_ = -1;
+    double credit_s_ = 0, paid_s_ = -1, spent_before_s_ = 0;  // see pay()
     std::thread thread_;
 };
 

@@ -41,6 +41,18 @@ class NullTracker final : public Tracker {
     TrackerReading reading_;
 };
 
+// "3" or "Sensor 3"; 0: a name.
+int sensor_number(const std::string& name) {
+    const std::string digits = name.rfind("Sensor ", 0) == 0 ? name.substr(7) : name;
+    if (digits.empty() || digits.size() > 2) return 0;
+    int number = 0;
+    for (const char c : digits) {
+        if (c < '0' || c > '9') return 0;
+        number = 10 * number + (c - '0');
+    }
+    return number <= kMaxSensors ? number : 0;
+}
+
 using Made = Result<std::unique_ptr<Tracker>>;
 
 Made make_mouse(const std::string&, const TrackerContext& context) {
@@ -105,7 +117,7 @@ constexpr TrackerKind kTrackers[] = {
     {"sweep", "sweep:NAME", kOptional, nullptr, nullptr, kStepped, make_sweep},
     {"replay", "replay:FILE[,NEEDLE_FILE]", kRequired, nullptr, nullptr, kNotStepped, make_replay},
     {"igtl", "igtl:HOST:PORT | igtl:listen:PORT", kRequired, "OpenIGTLink, this machine",
-     "igtl:127.0.0.1:18944", kNotStepped, make_igtl},
+     "igtl:127.0.0.1:18944", kNotStepped, make_igtl, true},
     {"viper", "viper", kNone, "Polhemus Viper", "viper", kStepped, make_usb<make_viper_driver>},
     {"3dg", "3dg", kNone, "NDI 3D Guidance", "3dg", kStepped, make_usb<make_guidance_driver>},
     {"liberty", "liberty", kNone, "Polhemus Liberty / Patriot", "liberty", kStepped,
@@ -135,11 +147,30 @@ Result<ToolNames> parse_tool_names(const std::vector<std::string>& texts) {
             (role != "probe" && role != "needle" && role != "reference")) {
             return Error{"not a tool: " + text, "--tool",
                          "use ROLE=NAME with probe, needle or reference, e.g. "
-                         "needle=StylusTipToTracker"};
+                         "needle=StylusTipToTracker, or reference=3 for the third sensor"};
         }
         tools.emplace_back(role, text.substr(sign + 1));
     }
     return tools;
+}
+
+SensorAssignment assignment_of(const ToolNames& tools, const SensorAssignment& otherwise) {
+    SensorAssignment places = otherwise;
+    int* const of_role[] = {&places.probe, &places.needle, &places.reference};
+    const char* const roles[] = {"probe", "needle", "reference"};
+    for (const auto& [role, name] : tools) {
+        for (int r = 0; r < 3; ++r) {
+            if (role != roles[r]) continue;
+            // Of several names for a role the tracker puts each in the same place.
+            const int number = sensor_number(name);
+            const int sensor = number > 0 ? number - 1 : r;
+            for (int* other : of_role) {
+                if (other != of_role[r] && *other == sensor) *other = -1;
+            }
+            *of_role[r] = sensor;
+        }
+    }
+    return places;
 }
 
 Made make_tracker(const std::string& spec, const TrackerContext& context) {

@@ -12,13 +12,20 @@
 
 #include "formats/base/result.h"
 #include "formats/exercise/exercise.h"
+#include "runtime/engine/scan_engine.h"
 #include "runtime/engine/skin.h"
 #include "runtime/tracking/tracker.h"
 
 namespace sonocase::runtime::inline tracking_devices {
 
-// "needle=StylusTipToTracker" as the command line gives them. Errors: another form or role.
+// "needle=StylusTipToTracker" as the command line gives them; a sensor of a device without names is
+// its number, from 1: "reference=3". Errors: another form or role.
 Result<ToolNames> parse_tool_names(const std::vector<std::string>& texts);
+
+// Which sensors play the roles of `tools`: the one of that number, or where a tracker puts the one
+// of that name (kProbeSensor, kNeedleSensor, kReferenceSensor). Other roles are as in `otherwise`,
+// unless their sensor was given another role.
+SensorAssignment assignment_of(const ToolNames& tools, const SensorAssignment& otherwise);
 
 // What a tracker may be made from. Devices need the clock alone.
 struct TrackerContext {
@@ -42,6 +49,8 @@ struct TrackerKind {
     // argument: what follows the colon
     Result<std::unique_ptr<Tracker>> (*make)(const std::string& argument,
                                              const TrackerContext& context);
+    // Knows its sensors by the names it hears, and puts those with a role in their places.
+    bool names_sensors = false;
 };
 
 // Every kind, in the order of the help.

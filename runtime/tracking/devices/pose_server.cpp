@@ -134,8 +134,10 @@ void PoseServer::run() {
     std::vector<Client> clients;
     std::string last;
     while (!stop_) {
+        // Those who connect without end do not hold up those who are there.
+        std::size_t accepted = 0;
         for (Socket client = listener_.accept(clients.empty() ? 0.05 : 0.002); client.open();
-             client = listener_.accept(0)) {
+             client = ++accepted < kMaxClients ? listener_.accept(0) : Socket()) {
             if (clients.size() < kMaxClients) clients.push_back({std::move(client)});
         }
         std::string fresh;

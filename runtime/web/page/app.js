@@ -2,7 +2,7 @@
 
 // The pages and the ways between them: cases, scanning, after an attempt, scores.
 import {Core, PlainError, has_simd} from './core.js';
-import {download, file_name, keep_attempt, kept_attempts, launch_of, minutes, remove_attempts, send_statements, set_trainee, statement, trainee} from './results.js';
+import {download, file_name, keep_attempt, kept_attempts, launch_of, minutes, remove_attempts, send_statements, set_trainee, statement, trainee, words_of_sending} from './results.js';
 import {PoseSource} from './poses.js';
 import {ScanPage, element} from './scan.js';
 import {ArrivingCase} from './arriving.js';
@@ -52,6 +52,8 @@ class App {
         program.catch(() => {});  // said below
         try {
             this.list = await load_list();
+            this.send_waiting();
+            addEventListener('online', () => this.send_waiting());
         } catch (error) {
             this.list = {cases: []};
             this.say(error);
@@ -279,7 +281,7 @@ class App {
         const sent = await this.send([['completed', this.attempt, finished.score], ['scored', this.attempt, finished.score]]);
         $('after-notice').textContent = [
             kept ? '' : 'This browser keeps nothing: save recording and scores now.',
-            sent ? '' : 'The learning record store did not take the result: save the scores and hand them in.',
+            words_of_sending(sent),
             ...finished.score.warnings].filter((words) => words).join(' ');
         this.settled = this.started;  // kept and sent, or said that it was not
     }
@@ -287,7 +289,15 @@ class App {
         const published = this.list?.xapi ?? '';
         const launch = launch_of(location.search, published);
         return send_statements(launch?.endpoint ?? published,
-            which.map(([verb, attempt, score]) => statement(verb, attempt, score, launch)), launch?.auth);
+            which.map(([verb, attempt, score]) => statement(verb, attempt, score, launch)),
+            launch?.auth || (this.list?.xapi_auth ?? ''));
+    }
+    // What waited in this browser since an earlier visit, or while there was no network.
+    send_waiting() {
+        this.send([]).then(({waiting}) => {
+            clearTimeout(this.again);
+            if (waiting) this.again = setTimeout(() => this.send_waiting(), 60000);
+        });
     }
 
     show_after(score) {

@@ -2,7 +2,7 @@
 
 // Attempts that are kept in this browser, and statements to a learning record store.
 
-const kDatabase = 'sonocase', kStore = 'attempts';
+const kDatabase = 'sonocase', kStore = 'attempts', kWaiting = 'statements';
 
 function request(work) {
     return new Promise((done, failed) => {
@@ -16,8 +16,14 @@ let database;
 async function open_database() {
     if (database !== undefined) return database;
     try {
-        const opening = indexedDB.open(kDatabase, 1);
-        opening.onupgradeneeded = () => opening.result.createObjectStore(kStore, {keyPath: 'id', autoIncrement: true});
+        const opening = indexedDB.open(kDatabase, 2);
+        opening.onupgradeneeded = () => {
+            const db = opening.result;
+            if (!db.objectStoreNames.contains(kStore)) db.createObjectStore(kStore, {keyPath: 'id', autoIncrement: true});
+            if (!db.objectStoreNames.contains(kWaiting)) db.createObjectStore(kWaiting, {keyPath: 'key', autoIncrement: true});
+        };
+        // Another page of this site still has the older version open: nothing waits for it.
+        opening.onblocked = () => opening.onerror?.();
         database = await request(opening);
     } catch {
         database = null;
@@ -25,9 +31,9 @@ async function open_database() {
     return database;
 }
 
-async function store(mode) {
+async function store(mode, name = kStore) {
     const open = await open_database();
-    return open && open.transaction(kStore, mode).objectStore(kStore);
+    return open && open.transaction(name, mode).objectStore(name);
 }
 
 // attempt: {started, trainee, case_name, exercise, title, passed, recording, score_text}.
@@ -108,13 +114,23 @@ export function launch_of(search, published) {
         activity: asked.get('activity_id') ?? ''};
 }
 
+// A UUID of version 4, also in pages that are not secure, where crypto.randomUUID is missing.
+function new_id() {
+    if (crypto.randomUUID) return crypto.randomUUID();
+    const b = crypto.getRandomValues(new Uint8Array(16));
+    b[6] = (b[6] & 0x0f) | 0x40;
+    b[8] = (b[8] & 0x3f) | 0x80;
+    const hex = [...b].map((byte) => byte.toString(16).padStart(2, '0')).join('');
+    return hex.replace(/^(.{8})(.{4})(.{4})(.{4})/, '$1-$2-$3-$4-');
+}
+
 const seconds_since = (started) => Math.max(0, (Date.now() - Date.parse(started)) / 1000);
 
 // An xAPI 1.0.3 statement. verb: of kVerb. score: of score_json, or null. launch: of launch_of.
 export function statement(verb, attempt, score, launch = null) {
     const site = location.href.replace(/[?#].*/, '');
     const out = {
-        id: crypto.randomUUID?.(),
+        id: new_id(),
         actor: launch?.actor ?? {objectType: 'Agent', account: {homePage: site, name: attempt.trainee || 'nobody'}},
         verb: {id: kVerb[verb], display: {en: verb}},
         object: {
@@ -138,22 +154,98 @@ export function statement(verb, attempt, score, launch = null) {
     return out;
 }
 
-// endpoint: the store's address, "" for none. auth: the Authorization that the launch gave; "": none.
-// Returns true if the store took them all.
-export async function send_statements(endpoint, statements, auth = '') {
-    if (!endpoint) return true;
+// Statements on their way: kept in this browser until the store has them, so that neither a store
+// that does not answer nor a page that is closed loses one. Without storage they wait in the page.
+let in_page = [], next_key = -1;
+async function wait_for_store(endpoint, statement) {
+    try {
+        const to = await store('readwrite', kWaiting);
+        if (to) return await request(to.add({endpoint, statement}));
+    } catch {
+        // No room: in the page.
+    }
+    in_page.push({key: next_key, endpoint, statement});
+    return next_key--;
+}
+async function waiting_for(endpoint) {
+    let kept = [];
+    try {
+        const from = await store('readonly', kWaiting);
+        if (from) kept = await request(from.getAll());
+    } catch {
+        // What waits in the page is sent all the same.
+    }
+    return [...kept, ...in_page].filter((one) => one.endpoint === endpoint);
+}
+async function no_longer_waits(one) {
+    in_page = in_page.filter(({key}) => key !== one.key);
+    try {
+        const from = one.key > 0 && await store('readwrite', kWaiting);
+        if (from) await request(from.delete(one.key));
+    } catch {
+        // It is sent again; the store knows its id.
+    }
+}
+
+// The store's status; 0: no answer.
+async function post(endpoint, statements, auth) {
+    const body = JSON.stringify(statements);
     try {
         const response = await fetch(`${endpoint.replace(/\/$/, '')}/statements`, {
             method: 'POST',
             credentials: 'same-origin',  // stores that answer any origin take no cookies
             headers: {'Content-Type': 'application/json', 'X-Experience-API-Version': '1.0.3',
                 ...auth ? {Authorization: auth} : {}},
-            body: JSON.stringify(statements),
+            body,
+            keepalive: body.length < 60000,  // also while the page is being left
+            ...AbortSignal.timeout ? {signal: AbortSignal.timeout(20000)} : {},
         });
-        return response.ok;
+        return response.status;
     } catch {
-        return false;
+        return 0;
     }
+}
+
+let sending = Promise.resolve();
+// Sends these and all that wait for this store, oldest first. endpoint: the store's address, "" for
+// none. auth: the Authorization that the launch or the site gave; "": none. It is not kept.
+// {waiting: how many wait still, refused: how many the store will not have, status: its last}.
+export function send_statements(endpoint, statements, auth = '') {
+    if (!endpoint) return Promise.resolve({waiting: 0, refused: 0, status: 200});
+    // One after the other: none is sent twice because two calls saw it waiting.
+    sending = sending.then(async () => {
+        for (const one of statements) await wait_for_store(endpoint, one);
+        let refused = 0, status = 200;
+        const taken = (code) => code >= 200 && code < 300 || code === 409;  // 409: it has that id
+        for (let all = await waiting_for(endpoint); all.length; all = all.slice(50)) {
+            const some = all.slice(0, 50);
+            status = await post(endpoint, some.map(({statement}) => statement), auth);
+            if (status >= 200 && status < 300) {
+                for (const one of some) await no_longer_waits(one);
+                continue;
+            }
+            // Of a store that is away, or wants another key, nothing is known of the statements.
+            if (status !== 400 && status !== 409 && status !== 413) break;
+            for (const one of some) {
+                status = await post(endpoint, [one.statement], auth);
+                if (!taken(status) && status !== 400) break;
+                if (status === 400) ++refused;
+                await no_longer_waits(one);
+            }
+            if (!taken(status) && status !== 400) break;
+        }
+        return {waiting: (await waiting_for(endpoint)).length, refused, status};
+    }).catch(() => ({waiting: statements.length, refused: 0, status: 0}));
+    return sending;
+}
+
+// What is said where a store did not take all; "": it did.
+export function words_of_sending({waiting, refused, status}) {
+    if (refused) return `The learning record store refuses ${refused} results: save the scores and hand them in.`;
+    if (!waiting) return '';
+    const why = status === 401 || status === 403 ? 'wants another key: open the page from the learning platform again'
+        : status === 0 ? 'does not answer, or does not allow this page (CORS)' : `answers ${status}`;
+    return `The learning record store ${why}. ${waiting} results wait in this browser and are sent again; save the scores to be sure.`;
 }
 
 export function minutes(seconds) {

@@ -2,7 +2,8 @@
 
 // Service worker: after one visit the page works without a network. The program and the page come
 // from the cache and are renewed in the background of the next visit; cases are kept by source.js.
-const kCache = 'sonocase-page-@VERSION@';
+// A host may have several sites, each with its own version.
+const kSite = `sonocase-page-${registration.scope} `, kCache = `${kSite}@VERSION@`;
 const kFiles = ['./', 'index.html', 'style.css', 'sonoplay.js', 'sonoplay.wasm', 'cases.json'];
 
 addEventListener('install', (e) => {
@@ -11,7 +12,7 @@ addEventListener('install', (e) => {
 });
 addEventListener('activate', (e) => e.waitUntil((async () => {
     for (const name of await caches.keys()) {
-        if (name.startsWith('sonocase-page-') && name !== kCache) await caches.delete(name);
+        if (name.startsWith(kSite) && name !== kCache) await caches.delete(name);
     }
     await clients.claim();
 })()));

@@ -59,6 +59,8 @@ TEST(ProgressBook, KeepsListsComparesAndExports) {
     EXPECT_EQ(csv.substr(0, 58), "trainee,case,exercise,started,passed,seed,elapsed_time_s,t");
     EXPECT_NE(csv.find("\r\n\"O'Brien, \"\"Bob\"\"\",demo,kidney,"), std::string::npos);
     EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 7);
+    ASSERT_TRUE(book->add(entry("=1+2", 0)));
+    EXPECT_NE(book->csv("=1+2", "")->find("\r\n'=1+2,demo,"), std::string::npos);
 }
 
 // A book as the first version wrote it keeps its sessions and takes new ones.
@@ -114,6 +116,7 @@ TEST(ProgressBook, ARemovedTraineeIsGoneWithFilesAndBytes) {
     e.recording = folder / "z.igs.mha";
     ASSERT_TRUE(write_file(e.recording, std::string_view("x")));
     ASSERT_TRUE(write_file(folder / "z.frames.igs.mha", std::string_view("x")));
+    ASSERT_TRUE(write_file(e.recording + ".scores.json", std::string_view("x")));
     ASSERT_TRUE(book->add(e));
     ASSERT_TRUE(book->add(entry("Ada", 1)));
     ASSERT_NE(read_text_file(path)->find("Zaphod-Unmistakable"), std::string::npos);
@@ -122,6 +125,7 @@ TEST(ProgressBook, ARemovedTraineeIsGoneWithFilesAndBytes) {
     EXPECT_TRUE(left.empty());
     EXPECT_FALSE(fs::exists(e.recording));
     EXPECT_FALSE(fs::exists(folder / "z.frames.igs.mha"));
+    EXPECT_FALSE(fs::exists(e.recording + ".scores.json"));
     EXPECT_EQ(book->sessions("", "")->size(), 1u);
     EXPECT_EQ(read_text_file(path)->find("Zaphod-Unmistakable"), std::string::npos);
 }

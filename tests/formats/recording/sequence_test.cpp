@@ -181,5 +181,22 @@ TEST(Sequence, NoFramesIsASequenceToo) {
     EXPECT_TRUE(back->frames.empty());
 }
 
+// A header that was written before the last frames: what it does not state is left out, and said.
+TEST(Sequences, FramesBeyondTheStatedNumberAreSaid) {
+    std::string text = "ObjectType = Image\nNDims = 3\nDimSize = 0 0 3\nElementType = MET_UCHAR\n";
+    for (int i = 0; i < 5; ++i) {
+        const std::string frame = "Seq_Frame000" + std::to_string(i) + "_";
+        text += frame + "ProbeToTrackerTransform = 1 0 0 1 0 1 0 2 0 0 1 3 0 0 0 1\n" + frame +
+                "Timestamp = " + std::to_string(i) + "\n";
+    }
+    text += "ElementDataFile = LOCAL\n";
+    const auto read =
+        read_sequence({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, "s");
+    ASSERT_TRUE(read) << read.error().message();
+    EXPECT_EQ(read->frames.size(), 3u);
+    ASSERT_EQ(read->notes.size(), 1u);
+    EXPECT_EQ(read->notes[0], "2 frames beyond the 3 that the header states are left out.");
+}
+
 }  // namespace
 }  // namespace sonocase

@@ -89,6 +89,40 @@ TEST(ToolFrames, ToolsThatEndInTwoFramesAreBroughtToOne) {
     EXPECT_NE(refused.error().message().find("ReferenceToTracker"), std::string::npos);
 }
 
+// A recording that has its tools the other way round only; calibrations are none of them.
+TEST(ToolFrames, PosesTheOtherWayRoundAreTurnedAndSaid) {
+    testing::Random random(9);
+    Sequence sequence;
+    sequence.transforms = {"ImageToProbe", "TrackerToProbe", "ReferenceToStylus"};
+    std::vector<Rigid> probe, needle;
+    for (int i = 0; i < 10; ++i) {
+        probe.push_back(random.rigid(300));
+        needle.push_back(random.rigid(300));
+        SequenceFrame frame;
+        frame.timestamp_s = 0.05 * i;
+        frame.poses = {{true, matrix_from_rigid(random.rigid(9))},
+                       {i != 4, matrix_from_rigid(inverse(probe.back()))},
+                       {true, matrix_from_rigid(inverse(needle.back()))}};
+        sequence.frames.push_back(frame);
+    }
+    add_inverses(sequence);
+    ASSERT_EQ(sequence.transforms.size(), 5u);
+    EXPECT_EQ(sequence.notes.size(), 2u);
+    const int p = find_tool(sequence, ToolRole::probe), n = find_tool(sequence, ToolRole::needle);
+    ASSERT_EQ(sequence.transforms[static_cast<std::size_t>(p)], "ProbeToTracker");
+    ASSERT_EQ(sequence.transforms[static_cast<std::size_t>(n)], "StylusToReference");
+    const std::vector<Pose> got = poses_of(sequence, p), stylus = poses_of(sequence, n);
+    for (std::size_t i = 0; i < probe.size(); ++i) {
+        EXPECT_EQ(got[i].ok, i != 4);
+        if (i == 4) continue;
+        EXPECT_LT(norm(got[i].tracker_from_tool.translation - probe[i].translation), 1e-9);
+        EXPECT_LT(norm(stylus[i].tracker_from_tool.translation - needle[i].translation), 1e-9);
+    }
+    const std::size_t before = sequence.transforms.size();
+    add_inverses(sequence);
+    EXPECT_EQ(sequence.transforms.size(), before);
+}
+
 TEST(ToolFrames, SaysWhyNoPoseCounts) {
     Sequence sequence = moving_reference().sequence;
     EXPECT_EQ(why_no_pose(sequence, 0), "");
@@ -304,6 +338,36 @@ TEST(PoseTables, OtherNamesAreUnderstood) {
     ASSERT_EQ(matrix.poses.size(), 1u);
     EXPECT_EQ(matrix.poses[0].tracker_from_tool.translation, (Vector3{4, 5, 6}));
     EXPECT_EQ(matrix.poses[0].tracker_from_tool.rotation(1, 0), 1);
+    // Rows and columns from 1, from 0, and in brackets as C programs print them.
+    std::string one = "t", zero = "t",
+                brackets = "t,Position X (mm),Position Y (mm),Position Z (mm)";
+    for (int r = 0; r < 4; ++r) {
+        for (int c = 0; c < 4; ++c) {
+            const auto cell = [&](int from) {
+                return ",T" + std::to_string(r + from) + std::to_string(c + from);
+            };
+            one += cell(1);
+            zero += cell(0);
+            if (r < 3 && c < 3)
+                brackets += ",Rotation[" + std::to_string(r) + "][" + std::to_string(c) + "]";
+        }
+    }
+    for (const std::string& header : {one, zero, brackets}) {
+        const ToolReadings given =
+            read_one(header + (header == brackets ? "\n0,4,5,6,0,-1,0,1,0,0,0,0,1\n"
+                                                  : "\n0,0,-1,0,4,1,0,0,5,0,0,1,6,0,0,0,1\n"));
+        ASSERT_EQ(given.poses.size(), 1u) << header;
+        EXPECT_EQ(given.poses[0].tracker_from_tool, matrix.poses[0].tracker_from_tool) << header;
+    }
+    // Times of Unix in whatever unit: the question names it.
+    for (const auto& [step, unit] :
+         {std::pair{50.0, "time_ms"}, {5e4, "time_us"}, {5e7, "time_ns"}}) {
+        std::string table = "timestamp,tx,ty,tz,qw,qx,qy,qz\n";
+        for (int i = 0; i < 20; ++i) table += number_text(step * (i + 1e5)) + ",1,2,3,1,0,0,0\n";
+        const auto asked = parse_pose_table(table, "p");
+        ASSERT_FALSE(asked);
+        EXPECT_NE(asked.error().message().find(unit), std::string::npos) << asked.error().message();
+    }
     const auto date = parse_pose_table(
         "timestamp,tx,ty,tz,qw,qx,qy,qz\n2024-05-01T12:00:00,1,2,3,1,0,0,0\n", "p");
     ASSERT_FALSE(date);

@@ -141,6 +141,29 @@ TEST(CheckCase, TextureMissing) {
     EXPECT_TRUE(names(bundle, "texture-missing"));
 }
 
+// Planes and a table where the fit reports what it does not know; neither where nothing was fitted.
+TEST(CheckCase, ThePageShowsWhatTheFitDoesNotKnow) {
+    CaseBundle bundle = plain_case();
+    const auto page = [&] { return check_page(bundle, CheckResult{}); };
+    const std::string plain = page();
+    EXPECT_EQ(plain.find("What is not known"), std::string::npos);
+    StageReport fit;
+    fit.stage = stage_names::kWarp;
+    fit.groups = {{"unknown_p90_mm", {{"liver", 11.2}, {"spleen", 4.1}}},
+                  {"unknown_p90_with_two_landmarks_mm", {{"liver", 3.4}, {"spleen", 4}}}};
+    bundle.manifest.stages.push_back(fit);
+    const std::string shown = page();
+    EXPECT_NE(shown.find("What is not known"), std::string::npos);
+    EXPECT_NE(shown.find("two landmarks far apart would bring liver from 11.2 to 3.4 mm"),
+              std::string::npos);
+    const auto pictures = [](const std::string& text) {
+        int n = 0;
+        for (std::size_t at = 0; (at = text.find("<img", at)) != std::string::npos; ++at) ++n;
+        return n;
+    };
+    EXPECT_EQ(pictures(shown), pictures(plain) + 3);
+}
+
 TEST(CheckCase, ThePageAndTheJsonNameTheFault) {
     CaseBundle bundle = plain_case();
     bundle.manifest.case_name = "<plain>";

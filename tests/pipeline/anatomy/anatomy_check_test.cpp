@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <vector>
@@ -137,6 +138,7 @@ BodySummary mapped(const BodySummary& body,
         to.box = box(from.box);
         to.ml = from.ml * factor.x * factor.y * factor.z;
         for (int r = 0; r < 3; ++r) {
+            to.length_mm[r] = factor[r] * from.length_mm[m[r]];
             to.cut_low[r] = sign[r] > 0 ? from.cut_low[m[r]] : from.cut_high[m[r]];
             to.cut_high[r] = sign[r] > 0 ? from.cut_high[m[r]] : from.cut_low[m[r]];
         }
@@ -157,7 +159,13 @@ void exchange_names(BodySummary& body,
 void merge(BodySummary& body, std::size_t to, std::size_t from) {
     LabelSummary& a = body.labels[to];
     const LabelSummary b = body.labels[from];
-    a.centre = a.centre + (b.ml / (a.ml + b.ml)) * (b.centre - a.centre);
+    const Vector3 apart = b.centre - a.centre;
+    const double share = b.ml / (a.ml + b.ml);
+    for (int r = 0; r < 3; ++r)
+        a.length_mm[r] = std::sqrt((1 - share) * std::pow(a.length_mm[r], 2) +
+                                   share * std::pow(b.length_mm[r], 2) +
+                                   12 * share * (1 - share) * std::pow(apart[r], 2));
+    a.centre = a.centre + share * apart;
     a.ml += b.ml;
     a.box.include(b.box.lower);
     a.box.include(b.box.upper);
@@ -493,25 +501,36 @@ TEST(AnatomyCheck, AgreementChoosesBetweenTables) {
     EXPECT_LT(*bad, kNamesAgree);
 }
 
+// Two seeds; for the page of evidence more of them, from 5 on.
+std::vector<std::uint64_t> seeds() {
+    const char* given = std::getenv("ANATOMY_SEEDS");
+    std::vector<std::uint64_t> list(given != nullptr ? std::max(1, std::atoi(given)) : 2);
+    std::iota(list.begin(), list.end(), 5);
+    return list;
+}
+
 TEST(AnatomyCheck, MistakesAreNamed) {
-    Mistakes mistakes;
-    sonocase::testing::Random random(5);
-    for (const NamedBody& body : bodies()) {
-        const BodySummary right = summarise_body(body.labels);
-        turn_axes(body.name, right, mistakes);
-        change_units(body.name, right, mistakes);
-        change_names(body.name, right, random, mistakes);
-        double_organs(body.name, right, mistakes);
-    }
-    const Rate all = mistakes.print();
-    EXPECT_GE(all.right, 0.98 * all.tries());
-    if (bodies().size() == 3) {
-        EXPECT_GE(all.tries(), 500);
+    for (const std::uint64_t seed : seeds()) {
+        Mistakes mistakes;
+        sonocase::testing::Random random(seed);
+        for (const NamedBody& body : bodies()) {
+            const BodySummary right = summarise_body(body.labels);
+            turn_axes(body.name, right, mistakes);
+            change_units(body.name, right, mistakes);
+            change_names(body.name, right, random, mistakes);
+            double_organs(body.name, right, mistakes);
+        }
+        std::printf("seed %d\n", static_cast<int>(seed));
+        const Rate all = mistakes.print();
+        EXPECT_GE(all.right, 0.98 * all.tries()) << "seed " << seed;
+        if (bodies().size() == 3) {
+            EXPECT_GE(all.tries(), 500);
+        }
     }
 }
 
-TEST(AnatomyCheck, CropsTiltsAndSizesAreNoFaults) {
-    sonocase::testing::Random random(6);
+void crops_tilts_and_sizes(std::uint64_t seed) {
+    sonocase::testing::Random random(seed);
     std::map<std::string, int> alarms, tries;
     const auto expect_right = [&](const std::string& kind, const std::string& name,
                                   const BodySummary& summary) {
@@ -562,7 +581,11 @@ TEST(AnatomyCheck, CropsTiltsAndSizesAreNoFaults) {
         all += alarms[kind];
         all_tries += count;
     }
-    EXPECT_LE(all, 0.01 * all_tries);
+    EXPECT_LE(all, 0.01 * all_tries) << "seed " << seed;
+}
+
+TEST(AnatomyCheck, CropsTiltsAndSizesAreNoFaults) {
+    for (const std::uint64_t seed : seeds()) crops_tilts_and_sizes(seed);
 }
 
 }  // namespace

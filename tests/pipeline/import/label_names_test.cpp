@@ -205,6 +205,56 @@ TEST_F(LabelNames, SegmentsCountWhateverTheirNumbers) {
     }
 }
 
+// Blanks between cells and within names: the whole name counts, and its side.
+TEST_F(LabelNames, BlanksWithinNamesBelongToThem) {
+    const std::string path = map(kTotal);
+    for (const auto& [name, text] :
+         {std::pair<const char*, const char*>{
+              "colours.ctbl",
+              "# Color table\n0 Nothing 0 0 0 0\n2 kidney right 1 2 3 255\n"
+              "3 kidney left 1 2 4 255\n5 liver 1 2 5 255\n"},
+          {"tabs.tsv", "2\tkidney right\n3\tkidney left\n5\tliver\n"},
+          {"heading.txt", "value name\n2 kidney right\n3 kidney left\n5 liver\n"},
+          {"commas.csv", "sep=,\nvalue,name\n2,kidney, right\n3,kidney, left\n5,liver\n5,liver\n"},
+          {"list.json",
+           "[{\"id\":2,\"name\":\"kidney right\"},{\"id\":3,\"name\":\"kidney left\"},"
+           "{\"id\":5,\"name\":\"liver\"}]"}}) {
+        ImportOptions options;
+        options.table = folder.write(name, text);
+        const auto imported = import_label_map(path, options);
+        EXPECT_EQ(names_of(imported)[2], "kidney right") << name;
+        EXPECT_EQ(names_of(imported)[3], "kidney left") << name;
+        EXPECT_EQ(names_of(imported)[5], "liver") << name;
+    }
+}
+
+// -1 or 255 for the outside, or a name for it: only 0 is outside here.
+TEST_F(LabelNames, BackgroundOfItsOwnNumberIsTheOutside) {
+    std::map<Organ, int> values = kTotal;
+    for (const int background : {255, 1}) {
+        TinyVolume volume = torso(values);
+        for (auto& voxel : volume.voxels)
+            voxel = static_cast<std::uint8_t>(voxel == 0        ? background
+                                              : background == 1 ? voxel + 1
+                                                                : voxel);
+        const std::string path = folder.write("map.nii", testing::nifti_bytes(volume));
+        ImportOptions options;
+        options.names = "none";
+        const auto imported = import_label_map(path, options);
+        EXPECT_EQ(names_of(imported).count(background), 0u);
+        EXPECT_EQ(imported->labels.labels.size(), 8u);
+        EXPECT_TRUE(says(imported, "value " + std::to_string(background) +
+                                       " holds all corners of the map, and no voxel is 0"));
+        // The advice: a name.
+        options.table = folder.write("t.csv", std::to_string(background) + ",fat\n");
+        EXPECT_EQ(names_of(import_label_map(path, options))[background], "fat");
+        options.table = folder.write("t.csv", std::to_string(background) + ",Exterior\n");
+        const auto named = import_label_map(path, options);
+        EXPECT_EQ(names_of(named).count(background), 0u);
+        EXPECT_TRUE(says(named, "('Exterior') is taken as the outside"));
+    }
+}
+
 TEST_F(LabelNames, TablesOfOtherProgramsAreReadForWhatTheyAre) {
     const std::pair<const char*, const char*> tables[] = {
         {"itksnap.txt",

@@ -94,6 +94,8 @@ TEST(PointTable, ReadsNamelessColumnsThatCanMeanOneThing) {
     for (const auto& [what, text] :
          {std::pair<const char*, std::string>{"three", rows("", "", " ")},
           {"count", "10\n" + rows("", "", " ")},
+          {"brackets", rows("[", "],", ", ")},
+          {"parentheses", rows("(", ")", ", ")},
           {"decimal commas", with_commas(rows("", "", " "))},
           {"normals", rows("", " 0 0.6 0.8", " ")},
           {"colours", rows("", ",255,0,12", ",")},
@@ -137,6 +139,31 @@ TEST(PointTable, AsksWhichColumnsAreMeantAndItsAdviceWorks) {
         flat += std::to_string(n) + "," + number(place(n).x) + "," + number(place(n).y) + "\n";
     EXPECT_NE(refusal(flat).find("counts upwards"), std::string::npos);
     EXPECT_EQ(refusal("x,y,z\n" + flat), "read");
+}
+
+// Commas between cells and within numbers: x and its tenths, y and its tenths, ... in centimetres.
+TEST(PointTable, DecimalCommasAmongCommasAreNotTakenForColumns) {
+    std::string commas, semicolons;
+    for (int n = 0; n < 40; ++n) {
+        const std::string x = std::to_string(12 + n % 7) + ",5",
+                          y = std::to_string(3 + n % 5) + ",2",
+                          z = std::to_string(n) + "," + std::to_string(n % 10);
+        commas += x + "," + y + "," + z + "\n";
+        semicolons += x + ";" + y + ";" + z + "\n";
+    }
+    const std::string message = refusal(commas);
+    EXPECT_NE(message.find("is a decimal comma among them?"), std::string::npos) << message;
+    const auto told = parse_point_table(semicolons, "a");  // the first advice
+    ASSERT_TRUE(told) << told.error().message();
+    EXPECT_EQ(told->points[3], (Point3{15.5, 6.2, 3.3}));
+    const auto named = parse_point_table("x,y,z,c4,c5,c6\n" + commas, "a");  // the second
+    ASSERT_TRUE(named) << named.error().message();
+    EXPECT_EQ(named->points[3], (Point3{15, 5, 6}));
+    // Whole numbers between blanks are x, y, z and a colour.
+    std::string blanks = commas;
+    for (char& c : blanks)
+        if (c == ',') c = ' ';
+    EXPECT_TRUE(parse_point_table(blanks, "a"));
 }
 
 TEST(PointTable, RefusesNamesThatAreNotCertain) {

@@ -254,6 +254,21 @@ TEST(ImportSurface, StlIsTextOrBinaryWhateverItsNamesAre) {
           {"binary called solid", solid},
           {"binary with a tail", stl_binary(mesh) + std::string(7, '\0')}})
         expect_ellipsoid(import_surface(folder.write(std::string(name) + ".stl", bytes)), name);
+    // Bytes of the writer's own behind each triangle; a number of them that means a colour.
+    std::string own = solid.substr(0, 84), colour = solid;
+    for (std::size_t n = 0; n < mesh.triangles.size(); ++n) {
+        const std::size_t at = 84 + 50 * n;
+        colour[at + 48] = static_cast<char>(n);
+        colour[at + 49] = '\x80';
+        own += solid.substr(at, 48) + std::string(1, static_cast<char>(n % 3)) + '\0' +
+               std::string(n % 3, 'x');
+    }
+    expect_ellipsoid(import_surface(folder.write("own.stl", own)), "own");
+    expect_ellipsoid(import_surface(folder.write("colour.stl", colour)), "colour");
+    const auto two = import_surface(folder.write("two.stl", solid + solid));
+    ASSERT_FALSE(two);
+    EXPECT_NE(two.error().what.find("bytes behind the 720 triangles"), std::string::npos)
+        << two.error().message();
     const std::string whole = stl_text(mesh, "solid a", "\n");
     // The advice: a text that is whole gets the line that lacks.
     const std::string open = whole.substr(0, whole.find("endsolid"));
@@ -330,6 +345,174 @@ TEST(ImportSurface, TurnsLpsToRas) {
     EXPECT_EQ(note(report), "the axes are LPS+ as the option --axes says");
     expect_ellipsoid(import_surface(folder.write("r.stl", stl_binary(mesh)), {}, &report), "kept");
     EXPECT_NE(note(report).find("does not say"), std::string::npos);
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+std::string replaced_all(std::string text, const std::string& from, const std::string& to) {
+    for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
+        text.replace(at, from.size(), to);
+    return text;
+}
+
+// Forms that programs write and readers stumble over, after their users' reports.
+TEST(ImportSurface, ReadsTheFormsOfOtherPrograms) {
+    const TemporaryFolder folder;
+    const Mesh mesh = ellipsoid();
+    const std::string ply = ply_ascii(mesh), obj = obj_text(mesh);
+    // One list of strips, each a triangle.
+    std::string strips = replaced(
+        replaced(ply.substr(0, ply.find("end_header")),
+                 "element face " + std::to_string(mesh.triangles.size()), "element tristrips 1"),
+        "list uchar int vertex_indices", "list int int vertex_indices");
+    strips += ply.substr(ply.find("end_header"), ply.find("\n3 ") + 1 - ply.find("end_header"));
+    std::string colours, negative, with_normals, continued;
+    for (const Point3 p : mesh.points) {
+        char row[160];
+        std::snprintf(row, sizeof row, "v %.9g %.9g %.9g 0.5 0.25 1\n", p.x, p.y, p.z);
+        colours += row;
+    }
+    const auto n = static_cast<int>(mesh.points.size());
+    std::size_t corners = 0;
+    std::string list;
+    for (const auto& t : mesh.triangles) {
+        char row[160];
+        std::snprintf(row, sizeof row, "f %d %d %d\n", static_cast<int>(t[0]) - n,
+                      static_cast<int>(t[1]) - n, static_cast<int>(t[2]) - n);
+        negative += row;
+        std::snprintf(row, sizeof row, "f %u//%u %u//%u %u//%u\n", t[0] + 1, t[0] + 1, t[1] + 1,
+                      t[1] + 1, t[2] + 1, t[2] + 1);
+        with_normals += row;
+        std::snprintf(row, sizeof row, "f %u %u \\\n %u\n", t[0] + 1, t[1] + 1, t[2] + 1);
+        continued += row;
+        list += std::to_string(t[0]) + " " + std::to_string(t[1]) + " " + std::to_string(t[2]) +
+                " -1\n";
+        corners += 4;
+    }
+    strips += std::to_string(corners) + "\n" + list;
+    std::string normals;
+    for (std::size_t i = 0; i < mesh.points.size(); ++i) normals += "vn 0 0 1\nvt 0 0\n";
+    const std::string vertices = obj.substr(0, obj.find("f "));
+    const std::string faces = obj.substr(obj.find("f "));
+    const std::pair<const char*, std::string> files[] = {
+        {"strips.ply", strips},
+        {"returns.ply", replaced_all(ply, "\n", "\r")},
+        {"pairs.ply", replaced_all(ply, "\n", "\r\n")},
+        {"capitals.ply",
+         replaced(replaced(ply, "property float x", "property float X"), "float y", "float Y")},
+        {"faces-first.ply", ply.substr(0, ply.find("element vertex")) +
+                                ply.substr(ply.find("element face"),
+                                           ply.find("end_header") - ply.find("element face")) +
+                                ply.substr(ply.find("element vertex"),
+                                           ply.find("element face") - ply.find("element vertex")) +
+                                "end_header\n" + ply.substr(ply.find("\n3 ") + 1) +
+                                ply.substr(ply.find("end_header\n") + 11,
+                                           ply.find("\n3 ") + 1 - ply.find("end_header\n") - 11)},
+        {"index.ply", replaced(ply, "vertex_indices", "vertex_index")},
+        {"colours.obj", colours + faces},
+        {"negative.obj", vertices + negative},
+        {"normals.obj", vertices + normals + with_normals},
+        {"continued.obj", vertices + continued},
+        {"groups.obj",
+         "mtllib a.mtl\no body\ng skin\nusemtl a\ns 1\n" + replaced_all(obj, "\n", "\r\n")},
+    };
+    for (const auto& [name, bytes] : files)
+        expect_ellipsoid(import_surface(folder.write(name, bytes)), name);
+    std::string lines = obj;
+    for (int v = 1; v < n; ++v)
+        lines += "l " + std::to_string(v) + " " + std::to_string(v + 1) + "\n";
+    expect_ellipsoid(import_surface(folder.write("lines.obj", lines)), "lines.obj");
+}
+
+// A polygon of 600 corners stands on one long line.
+TEST(ImportSurface, ReadsALongLineOfAnObj) {
+    const TemporaryFolder folder;
+    std::string obj, low = "f", high = "f";
+    constexpr int kCorners = 600;
+    for (const double z : {-200.0, 200.0})
+        for (int c = 0; c < kCorners; ++c)
+            obj += "v " + std::to_string(150 * std::cos(2 * kPi * c / kCorners)) + " " +
+                   std::to_string(100 * std::sin(2 * kPi * c / kCorners)) + " " +
+                   std::to_string(z) + "\n";
+    for (int c = 0; c < kCorners; ++c) {
+        low += " " + std::to_string(kCorners - c);
+        high += " " + std::to_string(kCorners + c + 1);
+        const int next = (c + 1) % kCorners;
+        obj += "f " + std::to_string(c + 1) + " " + std::to_string(next + 1) + " " +
+               std::to_string(kCorners + next + 1) + " " + std::to_string(kCorners + c + 1) + "\n";
+    }
+    const auto surface = import_surface(folder.write("long.obj", obj + low + "\n" + high + "\n"));
+    ASSERT_TRUE(surface) << surface.error().message();
+    EXPECT_EQ(surface->points.size(), 2u * kCorners);
+    EXPECT_EQ(surface->triangles.size(), 2u * kCorners + 2u * (kCorners - 2));
+}
+
+// Depth cameras write NaN for what they do not see.
+TEST(ImportSurface, LeavesPointsThatAreNoNumbersOut) {
+    const TemporaryFolder folder;
+    const Mesh mesh = ellipsoid();
+    std::string ply = "ply\nformat ascii 1.0\nelement vertex " +
+                      std::to_string(2 * mesh.points.size()) +
+                      "\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+    for (const Point3 p : mesh.points)
+        ply += std::to_string(p.x) + " " + std::to_string(p.y) + " " + std::to_string(p.z) +
+               "\nnan nan nan\n";
+    StageReport report;
+    const auto surface = import_surface(folder.write("camera.ply", ply), {}, &report);
+    ASSERT_TRUE(surface) << surface.error().message();
+    EXPECT_EQ(surface->points.size(), mesh.points.size());
+    ASSERT_EQ(report.warnings.size(), 1u);
+    EXPECT_NE(report.warnings[0].find(std::to_string(mesh.points.size()) + " points that are no"),
+              std::string::npos);
+}
+
+// Each refusal's advice is followed, and the surface is read.
+TEST(ImportSurfaceRefuses, WithAdviceThatWorks) {
+    const TemporaryFolder folder;
+    const Mesh mesh = ellipsoid();
+    const std::string ply = ply_ascii(mesh), stl = stl_binary(mesh), obj = obj_text(mesh);
+    const std::string vtk = vtk_text(mesh, "x", false);
+    const struct {
+        const char *name, *what, *advice;
+        std::string given, mended;
+        SurfaceFileOptions options{};
+    } cases[] = {
+        {"a.ply", "not a PLY file", "export it again", obj, ply},
+        {"a.ply", "without the property z", "export it again",
+         replaced(ply, "property float z", "property float w"), ply},
+        {"a.ply", "file ends or is damaged after", "is complete", ply.substr(0, ply.size() / 2),
+         ply},
+        {"a.ply", "names a vertex that does not exist", "export it again",
+         replaced(ply, "\n3 0 ", "\n3 9999 "), ply},
+        {"a.ply", "corner that is no number (NaN)", "take such vertices away",
+         replaced(ply, "\n10 20 230\n", "\nnan 20 230\n"), ply},
+        {"a.ply", "coordinate system is 'las'", "RAS or LPS",
+         replaced(ply, "ply\nformat ascii 1.0\n", "ply\nformat ascii 1.0\ncomment SPACE=LAS\n"),
+         replaced(ply, "ply\nformat ascii 1.0\n", "ply\nformat ascii 1.0\ncomment SPACE=RAS\n")},
+        {"a.stl", "cut off", "export it again", stl.substr(0, stl.size() / 2), stl},
+        {"a.stl", "holds no points", "the right file", std::string(84, '\0'), stl},
+        {"a.stl", "UTF-16", "save it as UTF-8", std::string("\xFF\xFEs\0o\0", 6),
+         stl_text(mesh, "solid a", "\n")},
+        {"a.vtk", "'UNSTRUCTURED_GRID'", "as polygons",
+         replaced(vtk, "POLYDATA", "UNSTRUCTURED_GRID"), vtk},
+        {"a.vtp", "cannot be read as VTP", "export it again", "<VTKFile", vtp_text(mesh)},
+        {"a.obj", "no points", "the right file", "# nothing\n", obj},
+        {"a.obj", "a comma among its numbers: v 10,0", "decimal points",
+         replaced(obj, "v 10 ", "v 10,0 "), obj},
+    };
+    for (const auto& c : cases) {
+        const auto refused = import_surface(folder.write(c.name, c.given), c.options);
+        ASSERT_FALSE(refused) << c.what;
+        const std::string message = refused.error().message();
+        EXPECT_NE(message.find(c.what), std::string::npos) << message;
+        EXPECT_NE(refused.error().expected.find(c.advice), std::string::npos) << message;
+        EXPECT_EQ(message.find("vtkX"), std::string::npos) << message;
+        expect_ellipsoid(import_surface(folder.write(c.name, c.mended), c.options), c.what);
+    }
 }
 
 // A cloud is reduced whatever its file, and whatever it is reduced to is the same.

@@ -141,6 +141,22 @@ TEST(LandmarkFile, TwoListsOfMarksArePairedByName) {
     EXPECT_NE(alone.error().message().find("--surface-landmarks"), std::string::npos);
     const std::string less = folder.write("less.csv", "name,x,y,z\nhip,1,2,3\n");
     EXPECT_NE(load_landmarks(patient, less).error().message().find("'navel'"), std::string::npos);
+    // Marks without names, or with the same, would all be paired with the first.
+    for (const auto& [name, what] :
+         {std::pair{"", "mark 1 has no name"}, std::pair{"navel", "two marks are named 'navel'"}}) {
+        const std::string twice = folder.write(
+            "twice.mrk.json",
+            std::string(R"({"markups":[{"coordinateSystem":"LPS","controlPoints":[{"label":")") +
+                name + R"(","position":[1,2,3]},{"label":")" + name +
+                R"(","position":[4,5,6]}]}]})");
+        for (const auto& refused :
+             {load_landmarks(twice, surface), load_landmarks(patient, twice)}) {
+            ASSERT_FALSE(refused);
+            EXPECT_NE(refused.error().message().find(what), std::string::npos)
+                << refused.error().message();
+            EXPECT_NE(refused.error().where.find("twice"), std::string::npos);
+        }
+    }
 }
 
 }  // namespace

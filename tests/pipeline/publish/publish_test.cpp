@@ -97,6 +97,25 @@ TEST_F(Publish, a_record_store_is_allowed_by_the_policy_and_no_other_host) {
     }
 }
 
+TEST_F(Publish, a_key_of_the_record_store_is_given_to_the_page) {
+    options_.xapi = "https://store.example.org/xapi";
+    for (const auto& [key, header] :
+         {std::pair{"key:secret", "Basic a2V5OnNlY3JldA=="}, {"Bearer abc", "Bearer abc"}}) {
+        options_.xapi_key = key;
+        ASSERT_TRUE(publish({case_path("round body")}, site(), options_));
+        EXPECT_NE(
+            text_of(site("/cases.json")).find("\"xapi_auth\":\"" + std::string(header) + "\""),
+            std::string::npos);
+    }
+    for (const char* wrong : {"secret", "key:se\ncret", "key:\xC3\xBC"}) {
+        options_.xapi_key = wrong;
+        EXPECT_FALSE(publish({case_path("round body")}, site("-wrong"), options_)) << wrong;
+    }
+    options_.xapi = "";
+    options_.xapi_key = "key:secret";
+    EXPECT_FALSE(publish({case_path("round body")}, site("-wrong"), options_));
+}
+
 TEST_F(Publish, a_pose_server_is_allowed_by_the_policy) {
     options_.poses = "ws://127.0.0.1:18946/?token=secret";
     ASSERT_TRUE(publish({case_path("round body")}, site(), options_));

@@ -86,6 +86,31 @@ TEST(RegisterSurfaces, GivesTheSameMapForAnySeedAndAnyNumberOfStarts) {
     }
 }
 
+// The tracker's frame is chance as well.
+TEST(RegisterSurfaces, GivesTheSameMapInAnyFrameOfTheTracker) {
+    const Surface mannequin = analytic_torso_mannequin();
+    const auto first = register_surfaces({torso_skin(), mannequin});
+    ASSERT_TRUE(first) << first.error().message();
+    Random random(4);
+    for (int n = 0; n < 2; ++n) {
+        const Rigid turn = random.rigid(400);
+        Surface turned = mannequin;
+        for (Point3& p : turned.points) p = turn * p;
+        const auto fitted = register_surfaces({torso_skin(), turned});
+        ASSERT_TRUE(fitted) << fitted.error().message();
+        std::vector<double> off;
+        for (double z = -120; z <= 120; z += 40) {
+            for (double x = -100; x <= 100; x += 40) {
+                const Point3 p{x, 0, z};
+                off.push_back(distance(mannequin_from_ct(fitted->registration, p),
+                                       turn * mannequin_from_ct(first->registration, p)));
+            }
+        }
+        std::sort(off.begin(), off.end());
+        EXPECT_LT(off[off.size() * 95 / 100], 0.5);
+    }
+}
+
 TEST(RegisterSurfaces, SaysForEachStructureWhatTheReadingsLeaveOpen) {
     const LabelVolume labels = sample_analytic_torso(analytic_torso_grid({3, 3, 3}));
     const Surface mannequin = analytic_torso_mannequin();

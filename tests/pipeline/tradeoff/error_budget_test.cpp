@@ -49,6 +49,26 @@ TEST(ErrorBudget, LeavesOutWhatWasNotReported) {
     EXPECT_TRUE(error_budget(std::vector{report("warp", {})}).entries.empty());
 }
 
+// Worst first, with what two landmarks would bring where the fit says it.
+TEST(UnknownPlaces, AreThoseOfTheFitWithTheAdviceThatHelpsMost) {
+    StageReport fit = report("warp", {});
+    fit.groups = {
+        {"unknown_p90_mm", {{"spleen", 4}, {"liver", 11}, {"bladder", 12}}},
+        {"unknown_p90_with_two_landmarks_mm", {{"spleen", 3.9}, {"liver", 3}, {"bladder", 11}}}};
+    const std::vector<UnknownPlace> places = unknown_places(std::vector{fit});
+    ASSERT_EQ(places.size(), 3u);
+    EXPECT_EQ(places[0].label, "bladder");
+    EXPECT_EQ(places[2].label, "spleen");
+    EXPECT_EQ(landmark_advice(places),
+              "two landmarks far apart would bring liver from 11.0 to 3.0 mm");
+    // Gains of less than a tenth are not worth a person's hand; without figures none are promised.
+    fit.groups[1].values = {{"spleen", 3.9}};
+    EXPECT_EQ(landmark_advice(unknown_places(std::vector{fit})), "");
+    fit.groups.pop_back();
+    EXPECT_EQ(landmark_advice(unknown_places(std::vector{fit})), "");
+    EXPECT_TRUE(unknown_places({}).empty());
+}
+
 // The shares are measurements. Bodies sampled finely and coarsely, in thick slices and in cubes,
 // cooked finely and coarsely: the budget is within a factor of 1.5 of the error that the truth
 // shows, which is what a reader needs to see which stage to spend time on.

@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "formats/scoring/tool_track.h"
 #include "support/random.h"
 #include "support/small_case.h"
@@ -55,6 +57,47 @@ TEST(ToolPoses, LeaveScriptedPosesAlone) {
     EXPECT_EQ(tools.mannequin_from_probe.translation, (Vector3{9, 8, 7}));
 }
 
+// A mannequin that is moved with the sensor fixed to it changes nothing; poses that are in the
+// mannequin or relative to the reference already are left as they are; a recording's tools have
+// their places whatever is assigned.
+TEST(ToolPoses, AreRelativeToTheReference) {
+    sonocase::testing::Random random(11);
+    const Rigid mannequin_from_reference = random.rigid(200);
+    Calibrations calibrations;
+    calibrations.mannequin.emplace();
+    calibrations.mannequin->sensor_from_tool = inverse(mannequin_from_reference);
+    for (int n = 0; n < 100; ++n) {
+        const Rigid world_from_mannequin = random.rigid(900);
+        const Rigid probe = random.rigid(200), needle = random.rigid(200);
+        TrackerReading reading;
+        reading.sensor_count = 3;
+        for (SensorReading& s : reading.sensors) s.state = SensorState::ok;
+        reading.sensors[2].world_from_sensor = world_from_mannequin * probe;
+        reading.sensors[1].world_from_sensor = world_from_mannequin * mannequin_from_reference;
+        reading.sensors[0].world_from_sensor = inverse(mannequin_from_reference) * needle;
+        reading.sensors[0].in_reference = true;
+        const SensorAssignment places{2, 0, 1};
+        ToolPoses tools = tool_poses(reading, calibrations, places);
+        ASSERT_TRUE(tools.has_probe && tools.has_needle);
+        // 1e-9 mm: a few roundings of lengths near a metre.
+        EXPECT_LT(norm(tools.mannequin_from_probe.translation - probe.translation), 1e-9);
+        EXPECT_LT(rotation_angle(transpose(tools.mannequin_from_probe.rotation) * probe.rotation),
+                  1e-7);
+        EXPECT_LT(norm(tools.mannequin_from_needle.translation - needle.translation), 1e-9);
+        reading.sensors[2].in_mannequin = true;
+        EXPECT_EQ(tool_poses(reading, calibrations, places).mannequin_from_probe.translation,
+                  reading.sensors[2].world_from_sensor.translation);
+        reading.sensors[2].in_mannequin = false;
+        reading.sensors[1].state = SensorState::lost;
+        tools = tool_poses(reading, calibrations, places);
+        EXPECT_FALSE(tools.has_probe);
+        EXPECT_TRUE(tools.has_needle);  // does not depend on it
+        reading.placed = true;
+        EXPECT_EQ(sensor_pose(reading, places_of(reading, places), 2)->translation,
+                  reading.sensors[2].world_from_sensor.translation);
+    }
+}
+
 class Engine : public ::testing::Test {
   protected:
     void SetUp() override {
@@ -103,6 +146,74 @@ TEST_F(Engine, KeepsTheLastPlaceOfALostProbe) {
     engine->frame(0.1, {}, pixels);
     EXPECT_EQ(engine->last().input.mannequin_from_probe, before);
     EXPECT_EQ(engine->probe_verdict(0.02), SensorVerdict::lost);
+}
+
+// Whatever happens to the reference, in every way in which a sensor is lost, nothing is placed by a
+// pose of it that is old, and both tools come back with it. As a device with numbered sensors sends
+// them, all at once, and as a stream does, each with a time of its own.
+TEST_F(Engine, ToolsAreLostWithTheReferenceAndComeBack) {
+    enum Way { silent, said, not_a_number, at_identity, repeated, kWays };
+    for (const bool own_times : {false, true}) {
+        for (int way = own_times ? 0 : 1; way < kWays; ++way) {
+            SCOPED_TRACE(std::to_string(way) + (own_times ? ", own times" : ""));
+            auto engine = ScanEngine::create(bundle_, exercise_, options_);
+            ASSERT_TRUE(engine);
+            engine->set_assignment({0, 1, 2});
+            std::vector<std::uint8_t> pixels(96 * 96);
+            sonocase::testing::Random random(5);
+            const auto noise = [&] { return random.uniform(-0.05, 0.05); };
+            double t = 0;
+            TrackerReading r;
+            r.sensor_count = 3;
+            const auto step = [&](bool seen) {
+                t += 1 / 60.0;
+                r.time_s = t;
+                ++r.sequence;
+                // The table with the mannequin is pushed about at 100 mm/s.
+                const Rigid world{{}, {100 * t, 0, 500}};
+                const Rigid probe{rotation_about({1, 0, 0}, kPi), {noise(), 10 * std::sin(t), 59}};
+                const auto set = [&](SensorReading& s, const Rigid& pose) {
+                    s.state = SensorState::ok;
+                    s.world_from_sensor = pose;
+                    if (own_times) s.time_s = t;
+                };
+                set(r.sensors[0], world * probe);
+                set(r.sensors[1], world * Rigid{{}, {30 + noise(), 0, 80}});
+                SensorReading& reference = r.sensors[2];
+                if (seen) {
+                    set(reference, world * Rigid{{}, {noise(), 0, 0}});
+                } else {
+                    if (own_times && way != silent) reference.time_s = t;
+                    if (way == said) reference.state = SensorState::lost;
+                    if (way == not_a_number) reference.world_from_sensor.translation.x = NAN;
+                    if (way == at_identity) reference.world_from_sensor = {};
+                }
+                engine->observe(r, true);
+                engine->frame(t, {}, pixels);
+                return engine->last().tools;
+            };
+            for (int i = 0; i < 60; ++i) {
+                const ToolPoses tools = step(true);
+                ASSERT_TRUE(tools.has_probe && tools.has_needle) << i;
+                ASSERT_LT(std::abs(tools.mannequin_from_probe.translation.z - 59), 1e-9);
+                ASSERT_LT(std::abs(tools.mannequin_from_probe.translation.x), 0.11);
+            }
+            for (int i = 0; i < 60; ++i) {
+                const ToolPoses tools = step(false);
+                if (i >= 18) EXPECT_FALSE(tools.has_probe || tools.has_needle) << i;  // 0.3 s
+            }
+            const SensorVerdict verdict = engine->reference_verdict(t);
+            EXPECT_TRUE(verdict == SensorVerdict::lost || verdict == SensorVerdict::stale);
+            ToolPoses tools;
+            for (int i = 0; i < 4; ++i) tools = step(true);
+            EXPECT_TRUE(tools.has_probe && tools.has_needle);
+            EXPECT_LT(std::abs(tools.mannequin_from_probe.translation.x), 0.11);
+            // Without a reference it is of no concern.
+            engine->set_assignment({0, 1, -1});
+            for (int i = 0; i < 30; ++i) tools = step(false);
+            EXPECT_TRUE(tools.has_probe && tools.has_needle);
+        }
+    }
 }
 
 // One live sensor never vouches for another. In each of the ways in which senders say that a tool

@@ -234,5 +234,41 @@ TEST(ReplayTracker, StartsOverWhenItLoopsAndEndsWhenNot) {
     EXPECT_EQ(once.health().phase, TrackerPhase::ended);
 }
 
+// Situations in which a recording plays other tools than its owner thinks, or none.
+TEST(LoadRecording, WhatIsNotPlayedOrDoesNotCountIsSaid) {
+    const sonocase::testing::TemporaryFolder folder;
+    const auto note_of = [&](const char* first, const char* second, const char* second_cells) {
+        std::string text =
+            "ObjectType = Image\nNDims = 3\nDimSize = 0 0 40\nElementType = "
+            "MET_UCHAR\n";
+        for (int i = 0; i < 40; ++i) {
+            const std::string frame = "Seq_Frame" + std::to_string(i) + "_";
+            text += frame + first + "Transform = 1 0 0 " + std::to_string(i) +
+                    ".5 0 1 0 20 0 0 1 300 0 0 0 1\n" + frame + second +
+                    "Transform = " + second_cells + "\n" + frame +
+                    "Timestamp = " + std::to_string(0.05 * i) + "\n";
+        }
+        const std::string path = folder.write("r.mha", text + "ElementDataFile = LOCAL\n");
+        const auto read = load_recording(path);
+        EXPECT_TRUE(read) << read.error().message();
+        return read ? std::string(read->note) : std::string();
+    };
+    const char* good = "1 0 0 9 0 1 0 20 0 0 1 300 0 0 0 1";
+    EXPECT_EQ(note_of("ProbeToTracker", "NeedleToTracker", good), "");
+    EXPECT_NE(
+        note_of("Probe1ToTracker", "Probe2ToTracker", good).find("--tool probe=Probe2ToTracker"),
+        std::string::npos);
+    EXPECT_NE(note_of("ProbeToTracker", "NeedleToTracker",
+                      "nan nan nan nan nan nan nan nan nan nan "
+                      "nan nan 0 0 0 1")
+                  .find("No pose of NeedleToTracker counts"),
+              std::string::npos);
+    EXPECT_NE(
+        note_of("ProbeToTracker", "MarkerToTracker", good).find("--tool needle=MarkerToTracker"),
+        std::string::npos);
+    EXPECT_NE(note_of("TrackerToProbe", "NeedleToTracker", good).find("inverse of TrackerToProbe"),
+              std::string::npos);
+}
+
 }  // namespace
 }  // namespace sonocase::runtime

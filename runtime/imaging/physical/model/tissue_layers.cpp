@@ -62,8 +62,8 @@ void march(const Cells& c, const std::vector<std::uint8_t>& open, CellField& u) 
         while (end > begin && !p[end - 1]) --end;
         open_in[row] = {begin, end};
     }
-    // A row that its last visit left as it was is visited again only after it or a row beside it has
-    // changed: rows count their visits. Most rows lie far from the surface.
+    // A row that its last visit left as it was is visited again only after it or a row beside it
+    // has changed: rows count their visits. Most rows lie far from the surface.
     std::vector<int> changed_at(open_in.size(), 0), settled_at(open_in.size(), -1);
     int visit = 0;
     bool changed = true;  // when one order changes nothing, the next ones will not either

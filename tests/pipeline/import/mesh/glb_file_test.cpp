@@ -61,6 +61,15 @@ TEST(GlbFile, RefusesWhatItCannotRead) {
                              "\"extensionsRequired\":[\"KHR_draco_mesh_compression\"]"))
                   .find("without compression"),
               std::string::npos);
+    // Those of looks alone leave the surface where it is.
+    EXPECT_EQ(
+        refusal(glb_of({{"a", ball, ""}}, "\"extensionsRequired\":[\"KHR_texture_transform\"]")),
+        "read");
+    EXPECT_NE(refusal(glb_of({{"a", ball, "\"skin\":0"}})).find("'a' is bent by bones"),
+              std::string::npos);
+    EXPECT_NE(refusal(glb_of({{"a", ball, "\"weights\":[0,0.5]"}})).find("by shape keys"),
+              std::string::npos);
+    EXPECT_EQ(refusal(glb_of({{"a", ball, "\"weights\":[0,0]"}})), "read");
     EXPECT_NE(refusal({1, 2, 3}).find("not a binary glTF"), std::string::npos);
     EXPECT_NE(refusal(glb_of({{"a", ball, "\"children\":[0]"}})).find("child"), std::string::npos);
     Surface wrong = ball;

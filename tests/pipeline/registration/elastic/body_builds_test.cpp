@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <optional>
 #include <tuple>
@@ -266,6 +268,72 @@ TEST(SharedPair, AKnownQuadraticIsNotTakenForAnotherBuild) {
         EXPECT_NE(note(*kept, "path"), "elastic") << note(*kept, "path_reason");
     }
 }
+
+// 95th percentile of how far apart two maps carry places inside the body.
+double apart_mm(const LabelVolume& labels, const Registration& a, const Registration& b) {
+    std::vector<double> off;
+    for (std::size_t n = 0; n < labels.voxels.size(); n += 499) {
+        if (labels.voxels[n] == 0) continue;
+        const int i = static_cast<int>(n % labels.grid.size.x),
+                  j = static_cast<int>(n / labels.grid.size.x % labels.grid.size.y),
+                  k = static_cast<int>(n / labels.grid.size.x / labels.grid.size.y);
+        const Point3 p = labels.grid.point_from_voxel({1.0 * i, 1.0 * j, 1.0 * k});
+        off.push_back(distance(mannequin_from_ct(a, p), mannequin_from_ct(b, p)));
+    }
+    std::sort(off.begin(), off.end());
+    return off[off.size() * 95 / 100];
+}
+
+// What a case teaches must not depend on chance: on a seed, or on where the search begins. One
+// other seed, and other starts; with SONOCASE_SEEDS=20 seeds 2 to 20.
+class AnySeed : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(AnySeed, GivesTheSameMap) {
+    const std::string which = GetParam();
+    const TorsoPatient* patient = &torso_patient();
+    TorsoPatient shared;
+    Surface sweep;
+    RegisterOptions options;
+    if (which == "shared") {
+        if (!shared_labels()) GTEST_SKIP() << "no " SONOCASE_DATA;
+        shared.labels = shared_labels()->labels;
+        shared.skin = *extract_skin_surface(shared.labels);
+        patient = &shared;
+        sweep = *import_surface(SONOCASE_DATA "/mannequin/sweep.csv");
+    } else if (which == "quadratic") {
+        Random random(2);
+        const Registration truth =
+            random_quadratic_map(patient->skin.box, patient->skin.skin, random, 9);
+        sweep = sweep_of(patient->skin.skin, truth, random);
+    } else {
+        const Build build = which == "belly" ? Build::belly : Build::gaunt;
+        const BuiltMannequin mannequin = built_mannequin(build, 1, usual_sweep(build));
+        sweep = mannequin.sweep;
+        options.up = mannequin.head;
+    }
+    const auto fit = [&](std::uint64_t seed, int starts) {
+        options.seed = seed;
+        options.rigid.starts = starts;
+        const auto fitted = register_surfaces({patient->skin, sweep, &patient->labels}, options);
+        EXPECT_TRUE(fitted);
+        return fitted ? fitted->registration : Registration{};
+    };
+    const Registration first = fit(1, 96);
+    const char* given = std::getenv("SONOCASE_SEEDS");
+    const int seeds = given ? std::atoi(given) : 2;
+    // Other starts come to rest elsewhere in the same basin: 0.51 mm apart on the belly.
+    EXPECT_LE(apart_mm(patient->labels, fit(1, 102), first), 0.7);
+    for (int seed = 2; seed <= seeds; ++seed) {
+        const double off =
+            apart_mm(patient->labels, fit(static_cast<std::uint64_t>(seed), 96), first);
+        EXPECT_LE(off, 0.5) << "seed " << seed;
+        if (given) std::printf("%s, seed %d: %.3f mm\n", which.c_str(), seed, off);
+    }
+}
+INSTANTIATE_TEST_SUITE_P(All,
+                         AnySeed,
+                         ::testing::Values("shared", "quadratic", "belly", "gaunt"),
+                         [](const auto& one) { return std::string(one.param); });
 
 // y = ((R + y) cos(a x), -(R + y) sin(a x), z): det J = a (R + y) > 0 everywhere, and more than one
 // turn over the box.

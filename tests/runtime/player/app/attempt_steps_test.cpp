@@ -10,6 +10,7 @@
 
 #include "formats/files/atomic_file.h"
 #include "runtime/player/app/case_steps.h"
+#include "runtime/player/app/tracker_steps.h"
 #include "runtime/player/session/clock.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"
@@ -210,6 +211,42 @@ TEST(ChangingTheTracker, ForgetsWhatTheOneBeforeReported) {
     EXPECT_EQ(frame.probe_verdict, SensorVerdict::absent);
     EXPECT_EQ(std::count(frame.pixels.begin(), frame.pixels.end(), 0),
               static_cast<long>(frame.pixels.size()));
+}
+
+// The set-up's table: each click gives a sensor a role, in which it takes the place of another, or
+// takes it away; a sensor without a name keeps it by its number, one with a name by that.
+TEST(GivingARole, IsKeptByNumberOrByName) {
+    PlayerState player;
+    CaseState loaded;
+    loaded.scan = std::make_unique<ScanThread>(session_clock(steady_seconds()));
+    TrackerInUse tracker;
+    tracker.spec = "viper";
+    EXPECT_EQ(sensors_in_use(player, tracker), (SensorAssignment{0, 1, -1}));
+    give_role(player, loaded, tracker, {}, 2, ToolOf::reference);
+    EXPECT_EQ(sensors_in_use(player, tracker), (SensorAssignment{0, 1, 2}));
+    give_role(player, loaded, tracker, {}, 2, ToolOf::probe);  // it cannot be both
+    EXPECT_EQ(sensors_in_use(player, tracker), (SensorAssignment{2, 1, -1}));
+    give_role(player, loaded, tracker, {}, 1, ToolOf::needle);  // taken away
+    EXPECT_EQ(sensors_in_use(player, tracker), (SensorAssignment{2, -1, -1}));
+    EXPECT_EQ(player.settings.probe_sensor, 2);
+    // Names are of another kind of tracker, and numbers say nothing about them.
+    tracker.spec = "igtl:127.0.0.1:18944";
+    EXPECT_EQ(sensors_in_use(player, tracker), (SensorAssignment{0, 1, -1}));
+    const std::vector<std::string> names{"", "", "StylusTipToTracker", "MarkerToTracker"};
+    give_role(player, loaded, tracker, names, 2, ToolOf::needle);
+    give_role(player, loaded, tracker, names, 3, ToolOf::reference);
+    EXPECT_EQ(player.settings.tools,
+              (std::vector<std::string>{"needle=StylusTipToTracker", "reference=MarkerToTracker"}));
+    EXPECT_EQ(sensors_in_use(player, tracker), (SensorAssignment{0, 1, 2}));
+    give_role(player, loaded, tracker, names, 3, ToolOf::needle);  // in the other's place
+    EXPECT_EQ(player.settings.tools, (std::vector<std::string>{"needle=MarkerToTracker"}));
+    give_role(player, loaded, tracker, names, 3, ToolOf::needle);
+    EXPECT_TRUE(player.settings.tools.empty());
+    tracker.spec = "viper";
+    EXPECT_EQ(sensors_in_use(player, tracker), (SensorAssignment{2, -1, -1}));
+    // What the command line says goes before, for this run.
+    player.arguments.tools = {"needle=4"};
+    EXPECT_EQ(sensors_in_use(player, tracker), (SensorAssignment{2, 3, -1}));
 }
 
 TEST(Cine, StepsThroughTheKeptFramesAndPlaysInARing) {

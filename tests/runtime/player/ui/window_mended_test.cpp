@@ -4,16 +4,21 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
+#include <thread>
 
+#include "formats/base/mailbox.h"
 #include "formats/files/load_save.h"
 #include "formats/progress_book/progress_book.h"
 #include "formats/recording/session.h"
 #include "runtime/player/ui/window_picture.h"
+#include "runtime/tracking/devices/igtl_message.h"
+#include "runtime/tracking/devices/socket.h"
 #include "support/small_case.h"
 #include "window_run.h"
 
@@ -195,6 +200,36 @@ TEST_F(WindowMended, TheSetUpShowsTheCourseOfTheResiduals) {
     };
     EXPECT_EQ(accent("step"), 0);
     EXPECT_GT(accent("course"), 300);
+}
+
+// A stream whose names say nothing: the set-up lists them, a click gives one its tool, and the
+// player keeps it.
+TEST_F(WindowMended, TheSetUpListsTheNamesThatWereHeardAndGivesThemTools) {
+    Result<Socket> server = Socket::listen("127.0.0.1", 0);
+    ASSERT_TRUE(server);
+    std::atomic<bool> over{false};
+    std::thread sender([&] {
+        Socket client = server->accept(60);
+        Event pace;
+        for (int i = 0; !over && client.open(); ++i) {
+            for (const char* name : {"AlphaToTracker", "BetaToTracker", "GammaToTracker"})
+                if (client.write(igtl::encode_transform(name, 1, {{}, {0.01 * i, 20, 300}})) < 0)
+                    client.close();
+            pace.wait(0.02);
+        }
+    });
+    const std::string arguments =
+        "--tracker igtl:127.0.0.1:" + std::to_string(server->port()) + " --ui-scale 1";
+    const CommandResult result =
+        run(arguments, "wait 90\nkey f3\nwait 20\n" + shot("heard") + "press probe-4\nwait 30\n" +
+                           shot("given") + "quit\n");
+    over = true;
+    sender.join();
+    ASSERT_EQ(result.status, 0) << result.error;
+    for (const char* name : {"AlphaToTracker", "BetaToTracker", "GammaToTracker"})
+        EXPECT_TRUE(says("heard", name)) << name;
+    EXPECT_EQ(settings()["tools"], (std::vector<std::string>{"probe=BetaToTracker"}));
+    EXPECT_EQ(settings()["probe_sensor"], 0);  // of devices with numbers
 }
 
 std::size_t sessions_in(const std::string& book) {

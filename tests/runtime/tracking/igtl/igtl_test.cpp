@@ -5,10 +5,17 @@
 
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
+#include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <thread>
+
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
 
 #include "formats/base/mailbox.h"
 #include "runtime/tracking/devices/igtl_message.h"
@@ -164,6 +171,7 @@ TEST(IgtlTracker, SaysWhyNoPoseComes) {
         {igtl::encode_transform("ImageToReference", 1, scaled), "ImageToReference has a scale"},
         {igtl::encode_transform("ProbeToTracker", 1, mirrored), "mirrored"},
         {igtl::encode_transform("MarkerToReference", 1, {}), "--tool probe=MarkerToReference"},
+        {igtl::encode_transform("TrackerToProbe", 1, {}), "inverse of a tool's pose"},
         {igtl::encode_transform("ProbeToTracker", 1, metres), "metres"},
         {igtl::encode("STATUS", "S", 1, Bytes(31, 7)), "none with a pose"}};
     for (const auto& [message, sentence] : cases) {
@@ -232,7 +240,7 @@ TEST(IgtlTracker, EachSensorHasItsOwnTimeFrameAndName) {
     EXPECT_EQ(reading.sensors[kNeedleSensor].time_s, needle_s);
 }
 
-TEST(IgtlTracker, PosesAreTakenRelativeToAReference) {
+TEST(IgtlTracker, TheReferenceHasItsPlaceAndSaysWhatIsRelativeToItAlready) {
     Result<Socket> server = Socket::listen("127.0.0.1", 0);
     ASSERT_TRUE(server);
     IgtlTrackerOptions options;
@@ -250,12 +258,56 @@ TEST(IgtlTracker, PosesAreTakenRelativeToAReference) {
             client.write(igtl::encode_transform("ProbeToTracker", 1, {{}, {probe, 0, 0}}));
             return tracker->poll(0, reading) &&
                    reading.sensors[kProbeSensor].state == SensorState::ok &&
-                   reading.sensors[kProbeSensor].world_from_sensor.translation.x ==
-                       probe - reference;
+                   reading.sensors[kReferenceSensor].world_from_sensor.translation.x == reference;
         }));
+        const auto pose =
+            sensor_pose(reading, {kProbeSensor, kNeedleSensor, kReferenceSensor}, kProbeSensor);
+        ASSERT_TRUE(pose);
+        EXPECT_EQ(pose->translation.x, probe - reference);
     };
     x_with(100, 250);
     x_with(300, 250);
+    EXPECT_FALSE(reading.sensors[kProbeSensor].in_reference);
+    ASSERT_TRUE(tracker.eventually([&] {
+        client.write(igtl::encode_transform("NeedleToReference", 1, {{}, {7, 0, 0}}));
+        return tracker->poll(0, reading) && reading.sensors[kNeedleSensor].in_reference;
+    }));
+    const std::vector<std::string> names = tracker->health().sensors;
+    ASSERT_EQ(names.size(), static_cast<std::size_t>(kMaxSensors));
+    EXPECT_EQ(names[kReferenceSensor], "ReferenceToTracker");
+    EXPECT_EQ(names[kNeedleSensor], "NeedleToReference");
+}
+
+// In the set-up a person gives the names that were heard their roles.
+TEST(IgtlTracker, NamesTakeTheirPlacesAnewWhenTheyAreGivenRoles) {
+    Result<Socket> server = Socket::listen("127.0.0.1", 0);
+    ASSERT_TRUE(server);
+    auto tracker = start_tracker(server->port(), false);
+    Socket client = server->accept(15);
+    ASSERT_TRUE(client.open());
+    const auto send = [&] {
+        for (const auto& [name, x] : {std::pair{"ATo1", 1.0}, {"BTo1", 2.0}, {"CTo1", 3.0}})
+            client.write(igtl::encode_transform(name, 1, {{}, {x, 0, 0}}));
+    };
+    TrackerReading reading;
+    const auto x_of = [&](int sensor) {
+        return reading.sensors[static_cast<std::size_t>(sensor)].world_from_sensor.translation.x;
+    };
+    ASSERT_TRUE(tracker.eventually([&] {
+        send();
+        return tracker->poll(0, reading) && reading.sensor_count == 5;
+    }));
+    EXPECT_EQ(reading.sensors[kProbeSensor].state, SensorState::absent);
+    const std::vector<std::string> names = tracker->health().sensors;
+    EXPECT_EQ(std::vector<std::string>(names.begin() + 2, names.begin() + 5),
+              (std::vector<std::string>{"ATo1", "BTo1", "CTo1"}));
+    tracker->set_tools({{"probe", "BTo1"}, {"reference", "ATo1"}});
+    ASSERT_TRUE(tracker.eventually([&] {
+        send();
+        return tracker->poll(0, reading) && x_of(kProbeSensor) == 2 &&
+               x_of(kReferenceSensor) == 1 && x_of(3) == 3;
+    }));
+    EXPECT_EQ(reading.sensors[kNeedleSensor].state, SensorState::absent);
 }
 
 TEST(IgtlTracker, ListensToAClientOfTheLibrary) {
@@ -399,6 +451,117 @@ TEST(IgtlTracker, SurvivesHostilePeers) {
         }));
     }
     EXPECT_GE(tracker->health().bad_frames, 3u);
+}
+
+double resident_mb() {
+    std::ifstream in("/proc/self/statm");
+    double size = 0, resident = 0;
+    in >> size >> resident;
+    return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1048576;
+}
+
+double process_seconds() {
+    timespec t{};
+    ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+// A program that sends without a pause for as long as it lives, and connects again when it is
+// thrown out. `drips`: byte by byte.
+class Flood {
+  public:
+    Flood(int port, const std::function<Bytes(int)>& message, bool drips) : child_(::fork()) {
+        if (child_ != 0) return;
+        for (int i = 0;;) {
+            Result<Socket> socket = Socket::connect("127.0.0.1", port, 1);
+            Bytes heard(256);
+            while (socket && socket->open()) {
+                const Bytes bytes = message(i++);
+                for (std::size_t at = 0; at < bytes.size();) {
+                    const std::size_t n = drips ? 1 : bytes.size() - at;
+                    const long sent = socket->write({bytes.data() + at, n});
+                    if (sent < 0) socket->close();
+                    if (sent < 0) break;
+                    if (sent == 0)
+                        (void)socket->read(heard, 0.001);  // until it is read: no load from here
+                    at += static_cast<std::size_t>(sent);
+                }
+            }
+        }
+    }
+    ~Flood() {
+        ::kill(child_, SIGKILL);
+        ::waitpid(child_, nullptr, 0);
+    }
+    Flood(const Flood&) = delete;
+    Flood& operator=(const Flood&) = delete;
+
+  private:
+    pid_t child_;
+};
+
+// Whatever is sent, and however fast, costs the player at most a tenth of a core: the picture,
+// which is drawn on others, does not become slower by more than that. Those who wait for poses are
+// woken 500 times a second at most, what they get is always of one size, and memory does not grow.
+TEST(IgtlTracker, AFloodTakesATenthOfACoreAndNoMemory) {
+    const Bytes good = igtl::encode_transform("ProbeToTracker", 1, {{}, {1, 2, 300}});
+    Bytes wrong = good, negative = good, endless = good;
+    wrong[57] ^= 1;
+    for (std::size_t i = 42; i < 50; ++i) negative[i] = 0xFF;
+    for (std::size_t i = 42; i < 50; ++i) endless[i] = i == 47 ? 15 : 0;  // 983 kB, never whole
+    endless.resize(igtl::kHeaderSize + 500000);
+    Bytes many(14000 * 70, 0);
+    for (std::size_t i = 0; i < many.size(); i += 70) {
+        std::snprintf(reinterpret_cast<char*>(&many[i]), 20, "T%zuToX", i);
+        std::copy(good.begin() + 58, good.end(),
+                  many.begin() + static_cast<std::ptrdiff_t>(i) + 22);
+    }
+    const Bytes tdata = igtl::encode("TDATA", "T", 1, many);
+    const struct {
+        const char* name;
+        std::function<Bytes(int)> message;
+        bool drips, comes;  // comes: poses arrive, and go on doing so
+    } floods[] = {
+        {"one name", [&](int) { return good; }, false, true},
+        {"endless names",
+         [](int i) { return igtl::encode_transform("N" + std::to_string(i) + "ToX", 1, {}); },
+         false, false},
+        {"fourteen thousand tools in a message", [&](int) { return tdata; }, false, true},
+        {"wrong checksums", [&](int) { return wrong; }, false, false},
+        {"negative sizes", [&](int) { return negative; }, false, false},
+        {"half a message", [&](int) { return endless; }, false, false},
+        {"byte by byte", [&](int) { return good; }, true, true},
+        {"pictures", [](int) { return igtl::encode("IMAGE", "U", 1, Bytes(300000, 7)); }, false,
+         false}};
+    for (const auto& flood : floods) {
+        SCOPED_TRACE(flood.name);
+        auto tracker = start_tracker(0, true);
+        const int port = static_cast<IgtlTracker&>(*tracker).port();
+        std::atomic<int> woken{0};
+        tracker->set_wake([&] {
+            ++woken;
+            tracker.event.notify();
+        });
+        const Flood sender(port, flood.message, flood.drips);
+        ASSERT_TRUE(tracker.eventually([&] {
+            const TrackerHealth health = tracker->health();
+            return flood.comes ? health.readings > 0 : health.connects > 0;
+        }));
+        const auto start = Clock::now();
+        const double before_s = process_seconds();
+        const int woken_before = woken;
+        const std::uint64_t had = tracker->health().readings;
+        const double memory_before_mb = resident_mb();
+        Event pause;
+        while (seconds_since(start) < 0.5) pause.wait(0.05);
+        const double wall_s = seconds_since(start), spent_s = process_seconds() - before_s;
+        // A tenth of a core, what was saved up for it, and as much again for an unlucky measure.
+        EXPECT_LT(spent_s, 0.1 * wall_s + 0.02 + 0.1);
+        EXPECT_LT(woken - woken_before, 520 * wall_s);
+        EXPECT_LT(resident_mb() - memory_before_mb, 30);
+        if (flood.comes) EXPECT_GT(tracker->health().readings, had);
+        tracker->set_wake({});
+    }
 }
 
 // One program is heard. A second one is refused and told of while the first sends, and heard once

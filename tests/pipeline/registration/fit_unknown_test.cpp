@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// What a fit says of its own error, against errors that are known: bodies carried by maps whose
+// inside is known, swept wholly or in part, with and without landmarks.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "pipeline/registration/fit/point_index.h"
+#include "support/torso_builds.h"
+#include "support/warped_skin.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+using namespace sonocase::testing;
+
+struct Body {
+    LabelVolume labels;
+    SkinSurfaceResult skin;
+    std::map<std::string, std::vector<Point3>> organs;  // about 60 points of each
+};
+
+// The standard torso, a slighter one, a heavier one.
+const Body& body(int which) {
+    static const std::vector<Body> bodies = [] {
+        std::vector<AnalyticBody> shapes(3);
+        shapes[1].width_scale = 0.85;
+        shapes[1].depth_scale = 0.9;
+        shapes[2].width_scale = 1.15;
+        shapes[2].depth_scale = 1.2;
+        shapes[2].belly_mm = 30;
+        std::vector<Body> all;
+        for (const AnalyticBody& shape : shapes) {
+            Body b;
+            b.labels = sample_analytic_torso(analytic_torso_grid({3, 3, 3}), shape);
+            b.skin = *extract_skin_surface(b.labels);
+            const Grid& grid = b.labels.grid;
+            std::vector<std::size_t> voxels(256, 0), seen(256, 0);
+            for (const std::uint8_t v : b.labels.voxels) ++voxels[v];
+            std::size_t n = 0;
+            for (int k = 0; k < grid.size.z; ++k) {
+                for (int j = 0; j < grid.size.y; ++j) {
+                    for (int i = 0; i < grid.size.x; ++i) {
+                        const std::uint8_t v = b.labels.voxels[n++];
+                        const std::size_t stride = 1 + voxels[v] / 60;
+                        if (v == 0 || seen[v]++ % stride != stride / 2) continue;
+                        b.organs[b.labels.labels[v].name].push_back(
+                            grid.point_from_voxel({1.0 * i, 1.0 * j, 1.0 * k}));
+                    }
+                }
+            }
+            all.push_back(std::move(b));
+        }
+        return all;
+    }();
+    return bodies[static_cast<std::size_t>(which)];
+}
+
+// A quadratic, and before it, in every second case, a skin of another build that fades with depth:
+// fat takes the difference, as the organs stay.
+struct KnownTruth {
+    Registration quadratic;
+    const Body* patient = nullptr;
+    bool built = false;
+    Build build = Build::belly;
+    double amplitude = 0, fade_mm = 60, shift_mm = 0;
+    Point3 centre;
+    PointIndex index;
+
+    Point3 operator()(Point3 x) const {
+        if (built) {
+            const Vector3 d = x - centre;
+            const double r = std::max(1e-6, std::hypot(d.x, d.y));
+            const std::uint32_t n = index.nearest(x);
+            const Vector3 e = x - patient->skin.skin.points[n];
+            const double depth = dot(e, patient->skin.skin.normals[n]) < 0 ? norm(e) : 0;
+            const double offset = amplitude *
+                                  build_offset_mm(build, d.y / r, d.x / r, d.z, shift_mm) *
+                                  std::exp(-depth * depth / (fade_mm * fade_mm));
+            x = x + offset * Vector3{d.x / r, d.y / r, 0};
+        }
+        return mannequin_from_ct(quadratic, x);
+    }
+};
+
+struct KnownCase {
+    KnownTruth truth;
+    Surface sweep;
+    RegisterOptions options;
+};
+
+KnownCase known_case(int n, std::uint64_t seed = 1) {
+    KnownCase c;
+    Random random(1000 * seed + static_cast<std::uint64_t>(n));
+    KnownTruth& truth = c.truth;
+    truth.patient = &body(n % 3);
+    const SkinSurfaceResult& skin = truth.patient->skin;
+    const double means[] = {4, 9, 14};
+    truth.quadratic = random_quadratic_map(skin.box, skin.skin, random, means[(n / 5) % 3]);
+    truth.centre = skin.box.centre();
+    truth.index = PointIndex(skin.skin.points);
+    if (n % 2 == 1) {
+        const double largest[] = {45, 30, 25, 40, 50};
+        const int build = (n / 2) % 5;
+        truth.built = true;
+        truth.build = kBuilds[build];
+        truth.fade_mm = random.uniform(50, 100);
+        // Slopes below 0.55: space does not fold.
+        truth.amplitude =
+            random.uniform(0.3, 1) * std::min(1.0, 0.55 * truth.fade_mm / (0.86 * largest[build]));
+        truth.shift_mm = random.uniform(-20, 20);
+    }
+    const int part = (n / 3) % 4, counts[] = {500, 2000, 1000, 1500};
+    const double noise_mm = 0.5 + 0.5 * (n % 3);
+    const Box3 box = skin.box;
+    const AreaSampler sampler(skin.skin);
+    while (static_cast<int>(c.sweep.points.size()) < counts[n % 4]) {
+        const auto [p, facing, corner] = sampler.draw(random);
+        if (part == 1 && p.y < truth.centre.y) continue;                    // the front
+        if (part == 2 && p.z < box.lower.z + box.extent().z / 3) continue;  // upper two thirds
+        const Vector3 noise{random.gaussian(), random.gaussian(), random.gaussian()};
+        c.sweep.points.push_back(truth(p) + noise_mm * noise);
+    }
+    const auto error = [&](double size) {
+        return size * Vector3{random.gaussian(), random.gaussian(), random.gaussian()};
+    };
+    c.options.up =
+        normalized(truth.quadratic.mannequin_from_ct.rotation * Vector3{0, 0, 1} + error(0.1));
+    if ((n / 2) % 2 == 1) {
+        for (const double height : {0.55, 0.12}) {
+            const double z = box.lower.z + height * box.extent().z;
+            const auto front = std::max_element(
+                skin.skin.points.begin(), skin.skin.points.end(), [&](Point3 a, Point3 b) {
+                    const auto score = [&](Point3 p) {
+                        return p.y - 3 * std::abs(p.z - z) - 3 * std::abs(p.x - truth.centre.x);
+                    };
+                    return score(a) < score(b);
+                });
+            c.options.landmarks.push_back({"mark" + std::to_string(c.options.landmarks.size()),
+                                           *front, truth(*front) + error(3)});
+        }
+    }
+    return c;
+}
+
+struct Held {
+    int turned = 0;  // cases that lie the other way round, which is said and not counted
+    int structures = 0, median = 0, p90 = 0, p95 = 0, covariance90 = 0, refits90 = 0;
+};
+
+// Fits one case and counts the structures whose error lies within what was said.
+void count(int n, const char* uncertainty, Held* held, std::uint64_t seed = 1) {
+    KnownCase c = known_case(n, seed);
+    c.options.uncertainty = uncertainty;
+    const Body& patient = *c.truth.patient;
+    const auto fitted = register_surfaces({patient.skin, c.sweep, &patient.labels}, c.options);
+    ASSERT_TRUE(fitted) << fitted.error().message();
+    // What is said of places holds for the pose that was taken. Where a body has no front or no
+    // head that its skin would show, the fit must say that.
+    const Matrix3& truth = c.truth.quadratic.mannequin_from_ct.rotation;
+    if (rotation_angle(transpose(truth) * fitted->registration.mannequin_from_ct.rotation) > 1.5) {
+        ++held->turned;
+        const auto is_untold = [](const Note& note) {
+            return (note.name == "head" || note.name == "front") && !note.text.starts_with("right");
+        };
+        EXPECT_TRUE(
+            std::any_of(fitted->report.notes.begin(), fitted->report.notes.end(), is_untold))
+            << "case " << n;
+        return;
+    }
+    for (const OrganUnknown& u : fitted->unknown) {
+        const std::vector<Point3>& points = patient.organs.at(u.label);
+        double sum = 0;
+        for (Point3 p : points) {
+            const Vector3 d = mannequin_from_ct(fitted->registration, p) - c.truth(p);
+            sum += dot(d, d);
+        }
+        const double error = std::sqrt(sum / static_cast<double>(points.size()));
+        ++held->structures;
+        held->median += error <= u.median_mm;
+        held->p90 += error <= u.p90_mm;
+        held->p95 += error <= u.p95_mm;
+        held->covariance90 += error <= u.covariance.p90_mm;
+        held->refits90 += error <= u.refits.p90_mm;
+        std::printf(
+            "case %d %s %s: error %.2f, said %.2f %.2f, covariance %.2f, refits %.2f, beyond a "
+            "rigid motion %.2f\n",
+            n, c.truth.built ? build_name(c.truth.build).c_str() : "quadratic", u.label.c_str(),
+            error, u.median_mm, u.p90_mm, u.covariance.p90_mm, u.refits.p90_mm, u.beyond_rigid_mm);
+    }
+}
+
+// Four of the sixty: more than half of the structures lie within the median's double, the 90 %
+// figure; fewer would say that a fit knows less than it says.
+TEST(FitUnknown, HoldsTheErrorOfKnownMaps) {
+    Held held;
+    for (const int n : {1, 2, 8, 11}) count(n, "off", &held);
+    EXPECT_GT(held.structures, 40);
+    EXPECT_GE(held.p90, held.structures * 6 / 10);
+    EXPECT_LE(held.median, held.p90);
+}
+
+TEST(FitUnknown, TheLargerOfTwoWaysIsSaid) {
+    KnownCase c = known_case(4);
+    c.options.uncertainty = "on";
+    c.options.refits = 3;
+    const Body& patient = *c.truth.patient;
+    const auto fitted = register_surfaces({patient.skin, c.sweep, &patient.labels}, c.options);
+    ASSERT_TRUE(fitted) << fitted.error().message();
+    ASSERT_FALSE(fitted->unknown.empty());
+    for (const OrganUnknown& u : fitted->unknown) {
+        EXPECT_GT(u.covariance.p90_mm, 0) << u.label;
+        EXPECT_GT(u.refits.p90_mm, 0) << u.label;
+        EXPECT_EQ(u.p90_mm, std::max(u.covariance.p90_mm, u.refits.p90_mm)) << u.label;
+        EXPECT_LT(u.median_mm, u.p90_mm) << u.label;
+        EXPECT_LT(u.p90_mm, u.p95_mm) << u.label;
+        if (c.options.landmarks.empty()) {
+            EXPECT_GT(u.p90_with_landmarks_mm, 0) << u.label;
+        }
+    }
+    // The map itself does not depend on it.
+    c.options.uncertainty = "off";
+    const auto plain = register_surfaces({patient.skin, c.sweep, &patient.labels}, c.options);
+    ASSERT_TRUE(plain);
+    EXPECT_EQ(plain->registration.residual.control_mm, fitted->registration.residual.control_mm);
+}
+
+// The measurement behind docs/accuracy.md: run with --gtest_also_run_disabled_tests.
+// SONOCASE_CALIBRATION_SEED  another sixty maps and sweeps; 1 by default
+TEST(FitUnknown, DISABLED_CalibrationOfSixtyFits) {
+    const char* given = std::getenv("SONOCASE_CALIBRATION_SEED");
+    const std::uint64_t seed = given ? std::strtoull(given, nullptr, 10) : 1;
+    Held held;
+    for (int n = 0; n < 60; ++n) count(n, "on", &held, seed);
+    const auto share = [&](int part) { return 100.0 * part / std::max(1, held.structures); };
+    std::printf(
+        "%d cases turned, and said so; %d structures; held by the median %.1f %%, 90 %%: %.1f %%, "
+        "95 %%: %.1f %%; the covariance "
+        "alone (90 %%) %.1f %%, the refits alone %.1f %%\n",
+        held.turned, held.structures, share(held.median), share(held.p90), share(held.p95),
+        share(held.covariance90), share(held.refits90));
+    EXPECT_GE(share(held.p90), 85);
+    EXPECT_LE(share(held.p90), 95);
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline
