@@ -215,6 +215,9 @@ class LayoutReader {
         if (plain && turns.size() > 1) {
             SONOCASE_TRY_DONE(read_again_and_again(turns));
         } else if (!plain && read_by_prefix()) {
+            if (!twice_.empty())
+                return Error{"has the columns of '" + twice_.substr(0, 40) + "' twice", at_,
+                             "one group of columns for each tool"};
             return layout_;
         } else {
             SONOCASE_TRY(Columns one, columns_of(""));
@@ -361,6 +364,7 @@ class LayoutReader {
                 Result<Columns> one = columns_of(prefix);
                 if (!one) continue;
                 one->tool = prefix.substr(0, prefix.size() - 1);
+                if (all(prefix + kPlaces[0]).size() > 1) twice_ = one->tool;
                 const bool known =
                     std::any_of(layout_.tools.begin(), layout_.tools.end(),
                                 [&](const Columns& tool) { return tool.tool == one->tool; });
@@ -446,6 +450,7 @@ class LayoutReader {
     std::string_view line_;
     std::string at_;
     std::vector<Named> columns_;
+    std::string twice_;  // a tool whose columns stand in the line more than once
     Layout layout_;
 };
 
@@ -715,7 +720,14 @@ Result<std::vector<ToolReadings>> parse_pose_table(std::string_view text,
     if (!layout) return Error{"is empty", where, "expected poses as CSV"};
     RowReader reader(*layout, where);
     std::vector<ToolReadings> tools;
-    for (const Columns& columns : layout->tools) tools.push_back({columns.tool, {}});
+    for (const Columns& columns : layout->tools) {
+        // Two poses of one tool at one time: which is it?
+        for (const ToolReadings& other : tools)
+            if (other.name == columns.tool)
+                return Error{"has the columns of '" + columns.tool.substr(0, 40) + "' twice", where,
+                             "name the columns of each tool after it, as in probe_tx and needle_tx"};
+        tools.push_back({columns.tool, {}});
+    }
     std::map<std::string, std::size_t, std::less<>> by_name;
     std::int64_t row = 0;
     while (!text.empty()) {

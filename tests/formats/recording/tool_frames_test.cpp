@@ -374,6 +374,16 @@ TEST(PoseTables, OtherNamesAreUnderstood) {
     EXPECT_NE(date.error().message().find("numbers of seconds"), std::string::npos);
 }
 
+TEST(PoseTables, OneToolTwiceInARowIsRefused) {
+    const auto twice = parse_pose_table(
+        "timestamp,probe_tx,probe_ty,probe_tz,probe_qw,probe_qx,probe_qy,probe_qz,"
+        "probe_tx,probe_ty,probe_tz,probe_qw,probe_qx,probe_qy,probe_qz\n"
+        "0,1,2,3,1,0,0,0,4,5,6,1,0,0,0\n",
+        "p");
+    ASSERT_FALSE(twice);
+    EXPECT_NE(twice.error().message().find("twice"), std::string::npos) << twice.error().message();
+}
+
 TEST(PoseTables, TimesThatTellNothingAreRefused) {
     std::vector<double> same(40, 7.0), ms, coarse, good;
     for (int i = 0; i < 40; ++i) {
