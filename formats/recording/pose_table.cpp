@@ -724,8 +724,9 @@ Result<std::vector<ToolReadings>> parse_pose_table(std::string_view text,
         // Two poses of one tool at one time: which is it?
         for (const ToolReadings& other : tools)
             if (other.name == columns.tool)
-                return Error{"has the columns of '" + columns.tool.substr(0, 40) + "' twice", where,
-                             "name the columns of each tool after it, as in probe_tx and needle_tx"};
+                return Error{
+                    "has the columns of '" + columns.tool.substr(0, 40) + "' twice", where,
+                    "name the columns of each tool after it, as in probe_tx and needle_tx"};
         tools.push_back({columns.tool, {}});
     }
     std::map<std::string, std::size_t, std::less<>> by_name;

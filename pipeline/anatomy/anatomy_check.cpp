@@ -638,8 +638,8 @@ class Check {
         }
     }
 
-    // Log of how much likelier the way from label i to label j is if their names are exchanged, beside
-    // what their places say: neighbours move together, so that it varies less than they do.
+    // Log of how much likelier the way from label i to label j is if their names are exchanged,
+    // beside what their places say: neighbours move together, so that it varies less than they do.
     double way_gain(std::size_t i, std::size_t j) const {
         const ModelStructure &a = *names_[i], &b = *names_[j];
         const double near = norm(a.at - b.at) / kNeighbours_mm;

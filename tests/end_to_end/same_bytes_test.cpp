@@ -25,8 +25,8 @@ namespace fs = std::filesystem;
 using sonocase::testing::read_text;
 using sonocase::testing::run_command;
 
-// Bundles: since their fit reports what it does not know of each structure. Physical frames: since pictures open
-// bright. Paper frames: of these bundles and of scripts that keep clear of ribs.
+// Bundles: since their fit reports what it does not know of each structure. Physical frames: since
+// pictures open bright. Paper frames: of these bundles and of scripts that keep clear of ribs.
 constexpr const char* kDraft = "225861fec997814740860117a2e11f77";
 constexpr const char* kBalanced = "b428b450f6d9f9576834c91057e4dafd";
 constexpr const char* kSlender = "e36a2e50ce0b664202376084f141be36";

@@ -267,8 +267,9 @@ void tour(const std::string& size, double scale, const std::string& language) {
     EXPECT_FALSE(picture.empty());
 }
 
-// The layout is a function of the window's size divided by the scale (layout.h): these are the sizes
-// that differ, 3840 x 2160 down to the least of 640 x 360, and one that comes out of rounding.
+// The layout is a function of the window's size divided by the scale (layout.h): these are the
+// sizes that differ, 3840 x 2160 down to the least of 640 x 360, and one that comes out of
+// rounding.
 TEST(WindowBoxes, NothingOverlapsOrIsCutAt1280) {
     for (const double scale : {1.0, 1.5, 2.0}) tour("1280x720", scale, "C");
 }
