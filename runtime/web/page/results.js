@@ -147,8 +147,15 @@ export function statement(verb, attempt, score, launch = null) {
         out.result = {success: score.passed, completion: true, extensions};
         const taken_s = seconds_since(attempt.started);
         if (Number.isFinite(taken_s)) out.result.duration = `PT${taken_s.toFixed(2)}S`;
-        const marks = score.pass_marks;
-        if (verb === 'scored' && marks.length)
+        const marks = score.pass_marks, list = score.procedure;
+        // The list of a procedure: what was ticked, with the second of it.
+        if (list) {
+            extensions[`${site}#checklist`] = list.items.map(({name, ticked, critical, time_s, why}) => ({name, ticked, critical, time_s, ...why ? {why} : {}}));
+            extensions[`${site}#complications`] = list.complications;
+        }
+        if (verb === 'scored' && list)
+            out.result.score = {raw: list.points, min: 0, max: list.max_points, scaled: list.max_points > 0 ? list.points / list.max_points : 0};
+        else if (verb === 'scored' && marks.length)
             out.result.score = {scaled: marks.filter((mark) => mark.passed).length / marks.length};
     }
     return out;

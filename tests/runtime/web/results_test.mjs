@@ -153,6 +153,17 @@ await run_tests({
             expect_equal(page.launch_of(search, 'https://store.example.org/xapi'), null, search);
         expect_equal(page.launch_of('?endpoint=https://store.example.org/', ''), null, 'a site without a store');
     },
+    async a_checklist_goes_with_its_points_and_moments() {
+        globalThis.indexedDB = undefined;
+        const page = await open_page();
+        const procedure = {points: 3, max_points: 4, complications: [{name: 'bleeding', time_s: 9}],
+            items: [{name: 'numbed', title: 'Way numbed', critical: true, ticked: true, time_s: 5}, {name: 'pressed', critical: false, ticked: false, time_s: null, why: 'not_done'}]};
+        const one = page.statement('scored', attempt, {...score, procedure});
+        expect_equal(one.result.score.scaled, 0.75, 'scaled');
+        expect_equal(one.result.score.max, 4, 'max');
+        const list = Object.entries(one.result.extensions).find(([name]) => name.endsWith('#checklist'))[1];
+        expect_equal(JSON.stringify(list), '[{"name":"numbed","ticked":true,"critical":true,"time_s":5},{"name":"pressed","ticked":false,"critical":false,"time_s":null,"why":"not_done"}]', 'list');
+    },
     async ids_are_there_and_differ_in_pages_that_are_not_secure() {
         globalThis.indexedDB = undefined;
         const secure = crypto.randomUUID;
