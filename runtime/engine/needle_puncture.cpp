@@ -73,9 +73,11 @@ void NeedlePuncture::touch(int layer, const LayersAlong& layers) {
     stopped_ = false;
     far_wall_ = step_;
     if (!next.lumen) return;
+    // Past the corners of voxels at its near wall: what is thin does not end a lumen.
     const auto limit = step_ + static_cast<std::int64_t>(kFarthestWallMm / kStepMm);
-    while (far_wall_ < limit && layers.index(layers.context, at_step(far_wall_)) == layer)
-        ++far_wall_;
+    const auto thin = static_cast<std::int64_t>(kThinMm / kStepMm);
+    for (std::int64_t n = far_wall_; n < limit && n - far_wall_ <= thin; ++n)
+        if (layers.index(layers.context, at_step(n)) == layer) far_wall_ = n + 1;
 }
 
 // Whether `layer` is but the corner of a voxel on a wall that the needle runs along: thin, with the

@@ -187,7 +187,7 @@ TEST(DopplerRuns, VesselsOfTheRealTorsoAndTheirExercises) {
     // The gate in the artery, and the cursor along it; then off it; then in the vein beside it.
     const std::string gate =
         "--tracker sweep:tilted --mode pw --steer 0 --spectral-scale 120 --gate ";
-    const std::string artery = "0.41,24,4", vein = "0.565,32,4";
+    const std::string artery = "0.41,26,4", vein = "0.565,32,4";
     EXPECT_TRUE(passes(path, measure, gate + artery + " --angle 53", recording));
     EXPECT_FALSE(passes(path, measure, gate + artery + " --angle 20", recording));
     EXPECT_FALSE(passes(path, measure, gate + vein + " --angle 53", recording));

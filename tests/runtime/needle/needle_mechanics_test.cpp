@@ -219,6 +219,19 @@ TEST(NeedlePuncture, TheCornerOfAVoxelIsNoWall) {
     EXPECT_EQ(count_of(follow(needle, track, line(25, 40, 0.1)), "posterior 4"), 1);
 }
 
+TEST(NeedlePuncture, TheCornerOfAVoxelEndsNoLumen) {
+    // Behind the near wall, where the dent of the puncture reaches beyond it.
+    Track track = groin(8);
+    track.boundaries = {{0, kSkinLayer},    {2, kFatLayer},       {10, kMuscleLayer},
+                        {18, kVeinLayer},   {18.7, kMuscleLayer}, {19, kVeinLayer},
+                        {30, kMuscleLayer}, {45, kBoneLayer}};
+    NeedlePuncture needle;
+    const std::string into = follow(needle, track, line(-2, 25, 0.1));
+    EXPECT_EQ(count_of(into, "puncture 4"), 1) << into;
+    EXPECT_EQ(count_of(into, "posterior"), 0) << into;
+    EXPECT_EQ(needle.tip_layer(), kVeinLayer);
+}
+
 TEST(NeedlePuncture, TremblingMakesNoEvents) {
     NeedlePuncture needle;
     const Track track = groin(8);
