@@ -256,7 +256,8 @@ void draw_tray(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& r
     const float whole = static_cast<float>(rows) * (high + between) - between;
     Box place = room.take_bottom(whole, 8);
     for (int cell = 0; cell < cells; ++cell) {
-        const float down = static_cast<float>(cell / 2) * (high + between);
+        const int line = cell / 2;
+        const float down = static_cast<float>(line) * (high + between);
         if (down + high > place.h + 1) break;
         const Box box = Box{place.x, place.y + down, place.w, high}.column(cell % 2, 2, between);
         ButtonStyle style;
