@@ -278,7 +278,7 @@ struct Screen {
     int console_page = 0;
     int tab = 0;           // of the column with tabs: task, image, 3-D view
     bool swapped = false;  // the 3-D view is in the picture's place
-    int put_off = -1;      // item of a procedure whose question waits
+    int put_off = -1;      // a procedure's questions up to this item wait
     AfterPage after;
 };
 

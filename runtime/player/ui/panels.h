@@ -58,12 +58,13 @@ struct TaskCardInput {
     int difficulty;     // of the attempt beside the exercise as written (draw_attempt.h)
     bool shows_finish;  // the card has the button that starts and ends an attempt
     const ProcedureView* procedure;    // of the frame shown; null: the exercise has none
-    int put_off;                       // question that the trainee put off; -1: none
+    int put_off;                       // questions up to this item wait; -1: none
     const std::vector<Label>& labels;  // of the case
 };
 struct TaskCardRequest {
     bool toggle_attempt = false, show_result = false, toggle_needle = false, next_hint = false,
-         skip_guide = false, end_replay = false, put_off_question = false;
+         skip_guide = false, end_replay = false;
+    std::optional<int> put_off;  // TaskCardInput::put_off from now on
     std::optional<Act> act;
 };
 TaskCardRequest draw_task_card(Ui& ui, const Box& card, const TaskCardInput& input);

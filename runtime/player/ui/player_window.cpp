@@ -149,6 +149,7 @@ void PlayerWindow::carry_out(const request::ChooseExercise& wanted) {
 
 void PlayerWindow::carry_out(const request::ToggleAttempt&) {
     Screen& screen = view_.screen;
+    screen.put_off = -1;
     if (toggle_attempt(player_, loaded_, scan_)) {
         screen.page = Page::after;
         screen.after = {};

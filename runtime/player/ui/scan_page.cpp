@@ -237,7 +237,7 @@ void show_task(const SessionView& session,
     if (wanted.skip_guide) requests.push_back(request::SkipGuide{});
     if (wanted.end_replay) requests.push_back(request::EndReplay{});
     if (wanted.toggle_needle) requests.push_back(request::ToggleNeedle{});
-    if (wanted.put_off_question) screen.put_off = input.procedure->question;
+    if (wanted.put_off) screen.put_off = *wanted.put_off;
     if (wanted.act) requests.push_back(request::PerformAct{*wanted.act});
 }
 

@@ -221,8 +221,8 @@ void draw_procedure_steps(Ui& ui, Box& room, const TaskCardInput& input) {
     const ProcedureView& view = *input.procedure;
     const int count = static_cast<int>(input.texts.steps.size());
     if (count == 0 || room.h < 30) return;
-    constexpr int kMostTabs = 10;
-    if (count <= kMostTabs) {
+    constexpr int kMaxTabs = 10;
+    if (count <= kMaxTabs) {
         const Box tabs = room.take_top(28, 6);
         for (int i = 0; i < count; ++i)
             draw_step_tab(ui, tabs.column(i, count, 4), i + 1,
@@ -293,13 +293,26 @@ bool wrapped_button(
     return pressed;
 }
 
+// The first item behind `after` that is asked now and has no answer; -1: none.
+int next_question(const TaskCardInput& input, int after) {
+    const std::vector<ProcedureItem>& items = input.exercise.procedure.items;
+    const ProcedureState& state = input.procedure->state;
+    for (int i = after + 1; i < static_cast<int>(items.size()); ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        const int from = items[at].from_step;
+        const bool asked = from < 0 || state.steps[static_cast<std::size_t>(from)].performed;
+        if (items[at].rule == ItemRule::asked && asked && !state.items[at].held) return i;
+    }
+    return -1;
+}
+
 bool question_waits(const TaskCardInput& input) {
-    return input.procedure->question >= 0 && input.procedure->question != input.put_off;
+    return next_question(input, input.put_off) >= 0;
 }
 
 // A question of the procedure, in all of the room; in small words where they do not fit.
 void draw_question(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
-    const int question = input.procedure->question;
+    const int question = next_question(input, input.put_off);
     const ExerciseTexts::Item& item = input.texts.items[static_cast<std::size_t>(question)];
     constexpr float kLater = 28, kBetween = 4;
     const float width = room.w - 20;
@@ -321,22 +334,32 @@ void draw_question(Ui& ui, Box& room, const TaskCardInput& input, TaskCardReques
     for (std::size_t o = 0; o < item.options.size(); ++o) {
         const Box box = card.take_top(option_high(item.options[o], type), kBetween);
         const std::string id = "option" + std::to_string(o);
-        if (wrapped_button(ui, id.c_str(), box, item.options[o], type, input.live))
+        if (wrapped_button(ui, id.c_str(), box, item.options[o], type, input.live)) {
             request.act =
                 Act{.kind = ActKind::answer, .index = question, .amount = static_cast<double>(o)};
+            request.put_off = -1;
+        }
     }
     ButtonStyle later;
     later.link = true;
     later.tip = "It is asked again when the next question is answered";
-    request.put_off_question =
-        ui.button("later", {card.x, card.y, ui.width(tr("Later"), Type::body) + 16, kLater},
-                  tr("Later"), later);
+    if (ui.button("later", {card.x, card.y, ui.width(tr("Later"), Type::body) + 16, kLater},
+                  tr("Later"), later))
+        request.put_off = question;
 }
 
 // The card while a procedure runs.
 void draw_procedure(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
     const ProcedureView& view = *input.procedure;
     if (question_waits(input)) return draw_question(ui, room, input, request);
+    if (next_question(input, -1) >= 0) {  // was put off
+        ButtonStyle style;
+        style.link = true;
+        const char* words = "A question waits";
+        if (ui.button("ask", room.take_top(28, 4).take_left(ui.width(tr(words), Type::body) + 16),
+                      tr(words), style))
+            request.put_off = -1;
+    }
     draw_tray(ui, room, input, request);  // before the steps: without it nothing can be done
     if (!input.exam) draw_procedure_steps(ui, room, input);
     const std::string done = done_words(input, view.state);

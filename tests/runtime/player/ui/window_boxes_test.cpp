@@ -43,10 +43,11 @@ std::vector<SeenBox> load_boxes(const std::string& file) {
     return boxes;
 }
 
-const char* const kPages[] = {
-    "scan",     "attempt",   "frozen", "after",   "replay",   "help",     "tracker", "effects",
-    "cases",    "exercises", "setup",  "colour",  "spectrum", "motion",   "named",   "marks",
-    "settings", "notices",   "class",  "sign_in", "longest",  "question", "tray",    "checklist"};
+const char* const kPages[] = {"scan",    "attempt",  "frozen",   "after",  "replay",
+                              "help",    "tracker",  "effects",  "cases",  "exercises",
+                              "setup",   "colour",   "spectrum", "motion", "named",
+                              "marks",   "settings", "notices",  "class",  "sign_in",
+                              "longest", "question", "asked",    "tray",   "checklist"};
 
 // A procedure with as many acts as the tray has keys, long words, and a question.
 const char* const kProcedure = R"(name = "procedure"
@@ -111,6 +112,7 @@ std::string longest_values() {
 std::string script(const std::string& folder) {
     const auto shot = [&](const char* name) { return "shot " + folder + "/" + name + ".png\n"; };
     return "wait 4\n" + shot("scan") + "key f5\nwait 4\nkey b\nwait 4\n" + shot("question") +
+           "press later\nwait 2\npress ask\nwait 2\n" + shot("asked") +
            "press later\nkey j\nkey k\nkey l\nkey i\nkey i ctrl\nwait 4\n" + shot("tray") +
            "key b\nwait 8\n" + shot("checklist") +
            "key escape\nkey f5 shift\nwait 4\nkey b\nkey n\nhold w 6\nkey h\nwait 2\n" +
@@ -244,8 +246,11 @@ void tour(const std::string& size, double scale, const std::string& language) {
         if (page == std::string("question")) {
             EXPECT_TRUE(has("option0") && has("option2") && has("later"));
         }
+        if (page == std::string("asked")) {
+            EXPECT_TRUE(has("option0"));
+        }
         if (page == std::string("tray")) {
-            EXPECT_TRUE(has("act0") && !has("option0"));
+            EXPECT_TRUE(has("act0") && has("ask") && !has("option0"));
         }
         if (page == std::string("notices")) {
             EXPECT_TRUE(has("close") && !has("Help"));
