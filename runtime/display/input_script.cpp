@@ -28,6 +28,7 @@ Result<InputScript> InputScript::load(const std::string& path) {
             (verb == "wheel" && n == 2) || (verb == "shot" && n == 2) ||
             (verb == "instructor" && n == 2) || (verb == "press" && n >= 2) ||
             (verb == "loop" && n == 2) || (verb == "quit" && n == 1) ||
+            (verb == "only-shots" && n == 1) ||
             ((verb == "down" || verb == "up") && n == 2 && line.words[1].size() == 1 &&
              line.words[1][0] >= '0' && line.words[1][0] <= '2') ||
             (verb == "key" && n >= 2 && key_code(line.words[1]) >= 0) ||
@@ -36,7 +37,7 @@ Result<InputScript> InputScript::load(const std::string& path) {
             return Error{
                 "line not understood: " + text, path + ":" + std::to_string(number),
                 "verbs are wait, key, hold, move, down, up, wheel, press, shot, instructor, "
-                "loop and quit"};
+                "only-shots, loop and quit"};
         }
         script.lines_.push_back(std::move(line));
     }
@@ -98,6 +99,8 @@ InjectedInput InputScript::next(double now_s, std::string& shot, bool& quit) {
     } else if (verb == "shot" || verb == "instructor") {
         shot = line.words[1];
         of_instructor_ = verb == "instructor";
+    } else if (verb == "only-shots") {
+        only_shots_ = true;
     } else if (verb == "loop") {
         if (now_s < number(1)) next_ = 0;
     } else if (verb == "quit") {

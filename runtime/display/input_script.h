@@ -10,6 +10,7 @@
 //   wheel DY
 //   shot FILE           save the window as PNG
 //   instructor FILE     save the second window as PNG
+//   only-shots          from here on, the first window draws only the pictures that are saved
 //   press NAME          click the control of that name (DrawnBox), wherever it is
 //   loop S              again from the first line until the clock says S seconds
 //   quit
@@ -39,6 +40,8 @@ class InputScript {
     InjectedInput next(double now_s, std::string& shot, bool& quit);
     // Whether the last next() asked for a picture of the second window.
     bool of_instructor() const { return of_instructor_; }
+    // Whether pictures that are not saved need not be drawn.
+    bool only_shots() const { return only_shots_; }
     // Finds a control by its name and gives its middle in window pixels; false: there is none.
     void set_finder(std::function<bool(const std::string& name, float& x, float& y)> find) {
         find_ = std::move(find);
@@ -53,7 +56,7 @@ class InputScript {
     std::size_t next_ = 0;
     int waiting_ = 0;
     InjectedInput input_;
-    bool release_ = false, of_instructor_ = false;
+    bool release_ = false, of_instructor_ = false, only_shots_ = false;
     int press_ = 0;  // steps of a press that are still to come
     std::function<bool(const std::string&, float&, float&)> find_;
 };

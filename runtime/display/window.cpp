@@ -262,13 +262,17 @@ void Window::begin_frame(const InjectedInput& injected) {
 }
 
 void Window::end_frame(bool capture) {
+    end_frame_unseen();
+    paint_window(impl_->window, capture ? &capture_ : nullptr);
+}
+
+void Window::end_frame_unseen() {
     ImGui::Render();
     ImGuiIO& io = ImGui::GetIO();
     g_taps.release(io.KeysDown);
     io.KeyShift = g_held.shift;
     io.KeyCtrl = g_held.control;
     io.KeyAlt = g_held.alt;
-    paint_window(impl_->window, capture ? &capture_ : nullptr);
 }
 
 void* Window::native() const {

@@ -52,6 +52,8 @@ class Window {
     void begin_frame(const InjectedInput& injected);
     // capture: keeps a copy of the picture for captured().
     void end_frame(bool capture = false);
+    // Ends one without drawing or showing it: for scripts, where only some pictures are looked at.
+    void end_frame_unseen();
     // The last captured picture, RGB, rows from the top.
     struct Capture {
         int width_px = 0, height_px = 0;

@@ -293,15 +293,20 @@ void PlayerWindow::show_picture(const PictureClock& clock) {
     if (arguments.frames > 0 && shown_ >= arguments.frames) quit = true;
     const bool last = quit || window.should_close();
     const double drawn_s = steady_seconds();
-    window.end_frame(!shot.empty() || (last && !arguments.screenshot.empty()));
+    const bool saved = !shot.empty() || (last && !arguments.screenshot.empty());
+    if (script_.only_shots() && !saved) {
+        window.end_frame_unseen();
+    } else {
+        window.end_frame(saved);
+    }
     if (shown_ > 1) {
         stats_.add(clock.between_s(), 1e3 * (drawn_s - clock.now_s()),
                    1e3 * (steady_seconds() - drawn_s));
     }
     if (!shot.empty()) {
-        Status saved = save_screenshot(window, shot);
-        if (saved) saved = write_boxes(ui_, shot);
-        if (!saved) notices.error(saved.error().message());
+        Status written = save_screenshot(window, shot);
+        if (written) written = write_boxes(ui_, shot);
+        if (!written) notices.error(written.error().message());
     }
     if (const Status shown = follow_instructor_window(session(tracker), notices, loaded, view,
                                                       instructor_ui_, instructor_shot);

@@ -111,8 +111,8 @@ std::string longest_values() {
 
 std::string script(const std::string& folder) {
     const auto shot = [&](const char* name) { return "shot " + folder + "/" + name + ".png\n"; };
-    return "wait 4\n" + shot("scan") + "key f5\nwait 4\nkey b\nwait 4\n" + shot("question") +
-           "press later\nwait 2\npress ask\nwait 2\n" + shot("asked") +
+    return "only-shots\nwait 4\n" + shot("scan") + "key f5\nwait 4\nkey b\nwait 4\n" +
+           shot("question") + "press later\nwait 2\npress ask\nwait 2\n" + shot("asked") +
            "press later\nkey j\nkey k\nkey l\nkey i\nkey i ctrl\nwait 4\n" + shot("tray") +
            "key b\nwait 8\n" + shot("checklist") +
            "key escape\nkey f5 shift\nwait 4\nkey b\nkey n\nhold w 6\nkey h\nwait 2\n" +

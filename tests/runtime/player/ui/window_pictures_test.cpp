@@ -28,13 +28,14 @@ const char* const kPanels[] = {"panels",      "frozen", "help",     "setup",    
 // A tour of all panels.
 std::string script(const std::string& folder) {
     const auto shot = [&](const char* name) { return "shot " + folder + "/" + name + ".png\n"; };
-    return "wait 12\nkey n\nhold w 20\nwait 8\n" + shot("panels") + "key o\nkey o\nwait 4\n" +
-           shot("needle_view") + "key o\nwait 3\n" + "key space\nwait 6\n" + shot("frozen") +
-           "key space\nwait 2\n" + "key f1\nwait 3\n" + shot("help") + "key f1\nkey f3\nwait 3\n" +
-           shot("setup") + "key escape\nkey f9\nwait 3\n" + shot("tracker") +
-           "key f9\nkey f10\nwait 3\n" + shot("effects") + "key f10\nkey b\nwait 20\n" +
-           shot("attempt") + "key b\nwait 6\n" + shot("scores") + "key p\nwait 6\n" +
-           shot("replay") + "key p\nwait 3\nkey escape\nkey f8\nwait 3\n" + shot("exercises") +
+    return "only-shots\nwait 12\nkey n\nhold w 20\nwait 8\n" + shot("panels") +
+           "key o\nkey o\nwait 4\n" + shot("needle_view") + "key o\nwait 3\n" +
+           "key space\nwait 6\n" + shot("frozen") + "key space\nwait 2\n" + "key f1\nwait 3\n" +
+           shot("help") + "key f1\nkey f3\nwait 3\n" + shot("setup") +
+           "key escape\nkey f9\nwait 3\n" + shot("tracker") + "key f9\nkey f10\nwait 3\n" +
+           shot("effects") + "key f10\nkey b\nwait 20\n" + shot("attempt") + "key b\nwait 6\n" +
+           shot("scores") + "key p\nwait 6\n" + shot("replay") +
+           "key p\nwait 3\nkey escape\nkey f8\nwait 3\n" + shot("exercises") +
            "key f8\nhold e 118\nkey 2 shift\nwait 20\n" + shot("colour") +
            "key 3 shift\nwait 300\n" + shot("spectrum") + "key 1 shift\nkey f2\nwait 60\n" +
            shot("cases") + "quit\n";
