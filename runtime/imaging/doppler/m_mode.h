@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // M-mode: one line of the picture over time. Column number k belongs to the time k / kPerSecond;
-// between two frames the newer one's line is repeated, so that the time axis is true.
+// between two frames the newer one's line is repeated, so that the time axis is true. Each column
+// has noise of its own, a function of its number and depth.
 #pragma once
 
 #include <cstdint>

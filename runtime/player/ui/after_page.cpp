@@ -41,7 +41,8 @@ void draw_result(Ui& ui, const Box& box, const ResultRow& row) {
     ui.icon(icon, mark.x, mark.y + 0.5f * mark.h - 12, 24, packed);
     const bool scale = room.w > 560;
     Box value = scale ? Box{} : room.take_right(120, 8);
-    Box line = scale ? room.take_right(0.42f * room.w, 16) : Box{};
+    // Its ends leave room for a whole mark.
+    Box line = scale ? room.take_right(0.42f * room.w, 16).inset(8, 0) : Box{};
     if (scale) value = room.take_right(130, 8);
     const float middle = room.y + 0.5f * room.h;
     // A long title takes two lines.

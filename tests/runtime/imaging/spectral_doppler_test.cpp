@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <vector>
@@ -234,6 +235,42 @@ TEST(MMode, AWallThatMovesIsSeenToMoveByThatMuch) {
     }
     EXPECT_NEAR(high - low, 2.0, 0.25);  // a pixel is 0.15 mm
     EXPECT_NEAR(0.5 * (high + low), 30, 0.3);
+}
+
+// A column is one emission: tissue at rest flickers from column to column about its grey in the
+// picture, what is black stays black, and the same times give the same strip.
+TEST(MMode, EveryColumnHasItsOwnGrain) {
+    const ScanGeometry geometry = make_scan_geometry(testing::linear_probe(), 192, 512, 300, 400);
+    MMode strip(geometry), again(geometry);
+    std::vector<std::uint8_t> grey(300 * 400);
+    for (int y = 0; y < 400; ++y)
+        for (int x = 0; x < 300; ++x)
+            grey[static_cast<std::size_t>(300 * y + x)] =
+                geometry.pixel_centre(x, y).z > 30 ? 100 : 0;
+    for (int i = 0; i < 120; ++i) {
+        strip.advance(0.5, i / 30.0, grey);
+        again.advance(0.5, i / 30.0, grey);
+    }
+    const auto row_at = [&](double mm) {
+        return static_cast<std::size_t>(mm / strip.mm_per_row());
+    };
+    double sum = 0, squares = 0, along = 0;
+    constexpr int kSeen = 300;
+    for (int k = 0; k < kSeen; ++k) {
+        const auto column = strip.column(strip.last() - k),
+                   next = strip.column(strip.last() - k - 1);
+        EXPECT_TRUE(std::ranges::equal(column, again.column(again.last() - k)));
+        EXPECT_EQ(column[row_at(15)], 0);
+        const double g = column[row_at(45)] - 100.0;
+        sum += g;
+        squares += g * g;
+        along += g * (next[row_at(45)] - 100.0);
+    }
+    const double sd = std::sqrt(squares / kSeen);
+    EXPECT_NEAR(sum / kSeen, 0, 1);  // of 300 columns: sd / 17
+    EXPECT_GT(sd, 3);
+    EXPECT_LT(sd, 8);
+    EXPECT_LT(std::abs(along / squares), 0.2);  // columns are independent: 3 sd of 300 are 0.17
 }
 
 }  // namespace
