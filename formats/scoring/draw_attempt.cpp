@@ -64,6 +64,8 @@ constexpr int kStarts = 200;           // places tried for the probe
 constexpr int kDirections = 96;        // directions tried for lines to a target
 constexpr double kSpareLengthMm = 10;  // length of the needle left for the hand
 constexpr double kOffPlaneMm = 20;     // distance of the targets from the scan plane at the start
+constexpr double kOpenMm = 40;         // depth to which the picture at the start is not in shadow
+constexpr double kLineGapMm = 6;       // between lines that are tried for it
 constexpr double kApartMm = 2;         // gap between a finding and other findings or targets
 constexpr std::uint64_t kLesionStream = 0x6A09E667F3BCC909ull;  // fractional part of the root of 2
 constexpr double kMinCosine = 0.17364817766693041;              // of 80 degrees
@@ -229,6 +231,20 @@ std::optional<Point3> skin_on_line(const Anatomy& anatomy, Point3 p, Vector3 bea
     return {};
 }
 
+// Whether sound gets kOpenMm deep along most of five lines that start side by side on a probe's
+// face: a picture that a rib or the lung blackens teaches nothing to begin with.
+bool sees_in(const Anatomy& anatomy, Point3 skin, Vector3 inwards, Vector3 lateral) {
+    int blocked = 0;
+    for (int i = -2; i <= 2; ++i) {
+        const Point3 from = skin + i * kLineGapMm * lateral;
+        bool open = true;
+        for (double s = 0; s < kOpenMm && open; s += 1)
+            open = !anatomy.blocks_sound(anatomy.label(from + s * inwards));
+        blocked += !open;
+    }
+    return blocked <= 2;
+}
+
 bool draw_start(Exercise& exercise, const Anatomy& anatomy, RandomStream& draws) {
     Vector3 beam = normalized(exercise.start_beam);
     if (norm(beam) == 0) beam = {0, 0, -1};
@@ -237,6 +253,7 @@ bool draw_start(Exercise& exercise, const Anatomy& anatomy, RandomStream& draws)
     const Vector3 across = x - dot(x, beam) * beam;
     const Vector3 lateral = norm(across) > 1e-6 ? normalized(across) : u;
     double best_mm = -1;
+    bool best_open = false;
     Point3 best;
     for (int i = 0; i < kStarts; ++i) {
         const double a = draws.uniform(-1, 1), b = draws.uniform(-1, 1);
@@ -248,16 +265,18 @@ bool draw_start(Exercise& exercise, const Anatomy& anatomy, RandomStream& draws)
         const Vector3 normal = skin_normal(anatomy, *skin);
         // On a flank, which faces sideways, the probe would be turned away.
         if (!(dot(normal, beam) < -0.5)) continue;
-        const Vector3 elevation =
-            normalized(cross(-normal, lateral - dot(lateral, normal) * normal));
+        const Vector3 along_face = lateral - dot(lateral, normal) * normal;
+        const Vector3 elevation = normalized(cross(-normal, along_face));
         double off_plane_mm = kOffPlaneMm;
         for (const Target& target : exercise.targets) {
             off_plane_mm = std::min(off_plane_mm, std::abs(dot(target.centre - *skin, elevation)));
         }
-        if (off_plane_mm <= best_mm) continue;
+        const bool open = sees_in(anatomy, *skin, -normal, normalized(along_face));
+        if (open < best_open || (open == best_open && off_plane_mm <= best_mm)) continue;
         best_mm = off_plane_mm;
+        best_open = open;
         best = *skin;
-        if (off_plane_mm >= kOffPlaneMm) break;
+        if (open && off_plane_mm >= kOffPlaneMm) break;
     }
     if (best_mm < 0) return false;
     exercise.start_probe = best;

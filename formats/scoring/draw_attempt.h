@@ -68,8 +68,10 @@ struct AttemptDraw {
 // place is left out, with a warning.
 //
 // With start_spread_mm > 0 the probe begins on the skin, half to all of that distance from
-// start_probe. Of 200 places drawn it is the first where every target lies at least 20 mm from the
-// scan plane that the mouse holds there, or else the one where they lie farthest from it.
+// start_probe. Of 200 places drawn it is the first where sound gets 40 mm deep along most of the
+// face and every target lies at least 20 mm from the scan plane that the mouse holds there; or else
+// the one where they lie farthest from it, among those that bone and gas leave open if there are
+// any.
 //
 // The same arguments give the same attempt on every machine: only +, -, *, / and square roots are
 // used. Cost: some milliseconds.

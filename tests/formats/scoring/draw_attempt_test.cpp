@@ -98,6 +98,23 @@ TEST(DrawAttempt, TheTargetLiesInItsOrganClearOfOthersAndTheStartAwayFromIt) {
     EXPECT_GT(farthest, 25);  // the whole region is used
 }
 
+// A window in the bone of 26 degrees about +z ends 44 mm beside it on the skin: beyond, the first
+// picture would be black. Two of five lines 6 mm apart may still end on its rim.
+TEST(DrawAttempt, TheStartShowsMoreThanARibsShadow) {
+    const WindowedBall body(0.9);
+    double farthest = 0;
+    for (std::uint64_t seed = 1; seed < 60; ++seed) {
+        const Point3 start = draw_attempt(exercise(), body, kLabels, seed).exercise.start_probe;
+        farthest = std::max(farthest, std::hypot(start.x, start.y));
+    }
+    EXPECT_GT(farthest, 35);
+    EXPECT_LT(farthest, 50);
+    // Behind a closed shell every place is as good as another.
+    const Point3 closed =
+        draw_attempt(exercise(), WindowedBall(2), kLabels, 1).exercise.start_probe;
+    EXPECT_GE(std::hypot(closed.x, closed.y), 30 - 1e-9);
+}
+
 // Easier attempts keep targets near their centre and the start near the target; harder ones start
 // farther away.
 TEST(DrawAttempt, AnEasierAttemptIsDrawnFromASmallerRegion) {
