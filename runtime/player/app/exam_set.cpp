@@ -75,15 +75,9 @@ void go_on_with_exam_set(PlayerState& player, CaseState& loaded, ScanState& scan
 
 std::string exam_set_words(const ExamSet& set) {
     const int count = static_cast<int>(set.exercises.size());
-    char words[96];
-    if (static_cast<int>(set.at) + 1 < count || !set.noted) {
-        std::snprintf(words, sizeof words, tr("Exam: exercise %d of %d"),
-                      static_cast<int>(set.at) + 1, count);
-    } else {
-        std::snprintf(words, sizeof words, tr("Exam finished: %d of %d passed."), set.passed,
-                      count);
-    }
-    return words;
+    if (static_cast<int>(set.at) + 1 < count || !set.noted)
+        return filled(tr("Exam: exercise %d of %d"), static_cast<int>(set.at) + 1, count);
+    return filled(tr("Exam finished: %d of %d passed."), set.passed, count);
 }
 
 }  // namespace sonocase::runtime::inline player_app

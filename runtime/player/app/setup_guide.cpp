@@ -18,12 +18,6 @@ constexpr std::size_t kMaxPoses = 3000;  // of a step; then every second one is 
 constexpr std::size_t kMinReadings = 10, kMinSweepReadings = 50;  // for a fit
 constexpr double kGoodTilt = 0.35;  // rad, about 20 degrees of tilt in every direction
 
-std::string number(const char* format, double value) {
-    char text[96];
-    std::snprintf(text, sizeof text, format, value);
-    return text;
-}
-
 double worst(Vector3 sigma) {
     return std::max({sigma.x, sigma.y, sigma.z});
 }
@@ -51,7 +45,7 @@ void show_point(const PointFit& fit,
     view.sigma_mm = view.figure_mm = worst(fit.sigma_mm);
     view.good_enough = fit.inliers >= 30 && view.sigma_mm < needed_mm && view.coverage > 0.5;
     view.sentence = view.good_enough
-                        ? number(tr("Good: the point is known to %.2f mm."), view.sigma_mm)
+                        ? filled(tr("Good: the point is known to %.2f mm."), view.sigma_mm)
                     : view.coverage <= 0.5 ? tr("Tilt it further, in every direction.")
                                            : tr("Continue: more readings make it more certain.");
 }
@@ -69,7 +63,7 @@ void show_direction(const DirectionFit& fit, SetupView& view) {
     view.good_enough =
         fit.length_mm > 40 && view.figure_mm < setup_needed_mm(SetupStep::probe_depth);
     view.sentence = view.good_enough
-                        ? number(tr("Good: known to %.2f degrees."), fit.sigma_rad * 57.29578)
+                        ? filled(tr("Good: known to %.2f degrees."), fit.sigma_rad * 57.29578)
                         : tr("Slide it further, straight and without turning it.");
 }
 
@@ -289,7 +283,7 @@ void SetupGuide::fit_needle_depths(const std::vector<Pose>& poses) {
     view_.good_enough = needle_.determined && view_.sigma_mm < setup_needed_mm(step_);
     view_.sentence = !needle_.determined ? needle_.problem
                      : view_.good_enough
-                         ? number(tr("Good: the tip is known to %.2f mm."), view_.sigma_mm)
+                         ? filled(tr("Good: the tip is known to %.2f mm."), view_.sigma_mm)
                          : tr("Record another depth.");
 }
 
@@ -323,7 +317,7 @@ void SetupGuide::fit_mannequin(const std::vector<Pose>& poses) {
     view_.sentence =
         !mannequin_.determined ? mannequin_.problem
         : view_.good_enough
-            ? number(tr("Good: the sweep fits the skin within %.1f mm."), mannequin_.rms_mm)
+            ? filled(tr("Good: the sweep fits the skin within %.1f mm."), mannequin_.rms_mm)
             : tr("Sweep more of the mannequin, including its sides.");
 }
 

@@ -20,10 +20,7 @@ std::string needed_words(const ResultRow& row) {
     if (!row.has_limit) return tr("No mark for this");
     const std::string limit = metric_words(row.metric, row.limit);
     if (!row.at_least && row.limit == 0) return tr("Needed: none");
-    char words[96];
-    std::snprintf(words, sizeof words,
-                  tr(row.at_least ? "Needed at least %s" : "Needed at most %s"), limit.c_str());
-    return words;
+    return filled(tr(row.at_least ? "Needed at least %s" : "Needed at most %s"), limit.c_str());
 }
 
 void draw_result(Ui& ui, const Box& box, const ResultRow& row) {
@@ -84,16 +81,9 @@ float draw_verdict(Ui& ui, const Box& box, const AttemptResult& result, int hint
                                             : "Not passed yet";
     ui.text(head.take_top(38), tr(verdict), Type::title);
     std::string all;
-    char words[96] = "";
-    if (result.marks > 0) {
-        std::snprintf(words, sizeof words, tr("%d of %d marks reached."), result.marks_reached,
-                      result.marks);
-        all = words;
-    }
-    if (hints > 0) {
-        std::snprintf(words, sizeof words, tr("Hints used: %d."), hints);
-        all += (all.empty() ? "" : " ") + std::string(words);
-    }
+    if (result.marks > 0)
+        all = filled(tr("%d of %d marks reached."), result.marks_reached, result.marks);
+    if (hints > 0) all += (all.empty() ? "" : " ") + filled(tr("Hints used: %d."), hints);
     ui.text(head, all, Type::body, colour::kDim, Align::left, true);
     return 68;
 }
@@ -137,10 +127,9 @@ void draw_checklist(Ui& ui,
     const ExerciseTexts texts = session.loaded.texts();
     const auto ticked = std::count_if(list.items.begin(), list.items.end(),
                                       [](const auto& item) { return item.ticked; });
-    char words[160];
-    std::snprintf(words, sizeof words, tr("Checklist: %d of %d, %.0f points of %.0f, %.0f needed"),
-                  static_cast<int>(ticked), static_cast<int>(list.items.size()), list.points,
-                  list.max_points, list.cut);
+    const std::string words = filled(tr("Checklist: %d of %d, %.0f points of %.0f, %.0f needed"),
+                                     static_cast<int>(ticked), static_cast<int>(list.items.size()),
+                                     list.points, list.max_points, list.cut);
     ui.paragraph(room.take_top(ui.paragraph_height(room.w, words, Type::bold) + 6), words,
                  Type::bold);
     const bool replays = !session.scan.training.score_file.empty();
@@ -192,10 +181,10 @@ void draw_checklist(Ui& ui,
                     true);
     }
     if (list.stray_acts > list.stray_acts_at_most) {
-        std::snprintf(words, sizeof words,
-                      tr("%d acts where no step asks for them; at most %d pass."), list.stray_acts,
-                      list.stray_acts_at_most);
-        room.take_top(ui.paragraph(room, words, Type::small, colour::kBad, true), 4);
+        const std::string stray =
+            filled(tr("%d acts where no step asks for them; at most %d pass."), list.stray_acts,
+                   list.stray_acts_at_most);
+        room.take_top(ui.paragraph(room, stray, Type::small, colour::kBad, true), 4);
     }
     if (!list.taken.empty()) {
         std::string core = std::string(tr("Last core")) + ":";
@@ -233,11 +222,8 @@ std::string advice_words(const SessionView& session) {
         return tr(
             "Well done. This was an easier attempt; the next is harder, and attempts as hard "
             "as the exercise is written count towards mastery.");
-    char line[160];
-    std::snprintf(line, sizeof line,
-                  tr("Do it again: %d passes in a row count as mastered; this was %d."), mastery,
+    return filled(tr("Do it again: %d passes in a row count as mastered; this was %d."), mastery,
                   std::max(now.in_a_row, 1));
-    return line;
 }
 
 void draw_advice(Ui& ui, const Box& card, const SessionView& session) {

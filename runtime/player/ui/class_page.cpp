@@ -26,8 +26,7 @@ void draw_cell(Ui& ui, const Box& box, const Standing& now) {
                         : now.passes > 0  ? "Passed"
                                           : "Not yet";
     ui.icon(icon, box.x + 4, box.y + 0.5f * box.h - 9, 18, packed);
-    char line[64];
-    std::snprintf(line, sizeof line, now.attempts ? "%s · %d" : "%s", tr(words), now.attempts);
+    const std::string line = now.attempts ? filled("%s · %d", tr(words), now.attempts) : tr(words);
     ui.text({box.x + 28, box.y, box.w - 32, box.h}, line, Type::small,
             now.attempts ? colour::kText : colour::kDim, Align::left, true);
 }
@@ -215,14 +214,14 @@ void draw_reliability(const BundleChooser& chooser,
         const auto found = records.reliability.find(exercise);
         if (found == records.reliability.end()) continue;
         const ExerciseReliability& r = found->second;
-        char words[160], alpha[48] = "–", mark[80] = "–";
-        if (std::isfinite(r.alpha))
-            std::snprintf(alpha, sizeof alpha, "%.2f (%d)", r.alpha, r.trainees);
-        if (std::isfinite(r.groups.mark))
-            std::snprintf(mark, sizeof mark, "%.1f mm (%d, %d)", r.groups.mark, r.groups.experts,
-                          r.groups.novices);
-        std::snprintf(words, sizeof words, "%s %s   %s %s", tr("alpha"), alpha, tr("pass mark"),
-                      mark);
+        const std::string alpha =
+            std::isfinite(r.alpha) ? filled("%.2f (%d)", r.alpha, r.trainees) : "–";
+        const std::string mark =
+            std::isfinite(r.groups.mark)
+                ? filled("%.1f mm (%d, %d)", r.groups.mark, r.groups.experts, r.groups.novices)
+                : "–";
+        const std::string words =
+            tr("alpha") + (" " + alpha + "   ") + tr("pass mark") + " " + mark;
         ui.text({row.x, row.y, 0.4f * row.w, row.h}, title_of(exercise, chooser).exercise,
                 Type::small, colour::kDim, Align::left, true);
         ui.text({row.x + 0.4f * row.w, row.y, 0.6f * row.w, row.h}, words, Type::small,
@@ -323,10 +322,9 @@ void draw_class_page(PlayerState& player,
     }
     const Box files = content.take_bottom(48, 12);
     if (const NeedsHelp& help = records.help; !help.trainee.empty()) {
-        char words[320];
-        std::snprintf(words, sizeof words, tr("%s may need help with %s: %d attempts, no pass."),
-                      help.trainee.c_str(), title_of(help.exercise, chooser).exercise.c_str(),
-                      help.attempts);
+        const std::string words =
+            filled(tr("%s may need help with %s: %d attempts, no pass."), help.trainee.c_str(),
+                   title_of(help.exercise, chooser).exercise.c_str(), help.attempts);
         Box line = content.take_top(32, 4);
         ui.icon(Icon::warn, line.x, line.y + 7, 18, colour::kWarn);
         line.take_left(26);

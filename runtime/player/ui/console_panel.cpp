@@ -309,8 +309,7 @@ ConsoleRequest draw_console(Ui& ui,
         }
     }
     if (pages > 1) {
-        char words[32];
-        std::snprintf(words, sizeof words, "%s  %d/%d", tr("More"), input.page + 1, pages);
+        const std::string words = filled("%s  %d/%d", tr("More"), input.page + 1, pages);
         ButtonStyle style;
         style.icon = Icon::next;
         style.tip = "The other controls";

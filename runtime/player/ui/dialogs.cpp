@@ -27,16 +27,14 @@ Box begin_page_dialog(Ui& ui, Screen& screen, const char* title, float width, fl
 
 void draw_effects_panel(const ScanFrame& frame, float s) {
     heading("Effects");
-    char total[48];
-    std::snprintf(total, sizeof total, tr("%.2f ms per frame"), frame.frame_ms);
-    ImGui::SameLine(ImGui::GetWindowContentRegionMax().x - ImGui::CalcTextSize(total).x);
-    ImGui::TextDisabled("%s", total);
+    const std::string total = filled(tr("%.2f ms per frame"), frame.frame_ms);
+    ImGui::SameLine(ImGui::GetWindowContentRegionMax().x - ImGui::CalcTextSize(total.c_str()).x);
+    ImGui::TextDisabled("%s", total.c_str());
     ImGui::PushFont(fonts().small);
     const Renderer::Accuracy& accuracy = frame.accuracy;
-    char lines[48];
-    std::snprintf(lines, sizeof lines, "%s, %d x %d", tr(accuracy.level == 0 ? "full" : "reduced"),
-                  accuracy.scanlines, accuracy.samples);
-    row("Accuracy", lines, accuracy.level == 0 ? colour::kText : colour::kWarn);
+    const std::string lines = filled("%s, %d x %d", tr(accuracy.level == 0 ? "full" : "reduced"),
+                                     accuracy.scanlines, accuracy.samples);
+    row("Accuracy", lines.c_str(), accuracy.level == 0 ? colour::kText : colour::kWarn);
     const float right = ImGui::GetWindowContentRegionMax().x;
     for (int i = 0; i < frame.cost_count; ++i) {
         const EffectCost& cost = frame.costs[i];
@@ -78,9 +76,8 @@ void draw_exam_set(
     style.icon = Icon::lock;
     style.enabled = size > 0 && !session.scan.training.attempt;
     style.tip = "Each marked exercise once, without help";
-    char words[64];
-    std::snprintf(words, sizeof words, tr("Start exam set (%d)"), size);
-    if (ui.button("exam_set", row, words, style)) requests.push_back(request::StartExamSet{});
+    if (ui.button("exam_set", row, filled(tr("Start exam set (%d)"), size), style))
+        requests.push_back(request::StartExamSet{});
 }
 
 void draw_marks(std::vector<Exercise::PassMark>& marks,

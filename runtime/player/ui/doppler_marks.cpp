@@ -110,14 +110,12 @@ void draw_velocities(Ui& ui, const Box& box, const DopplerSettings& d) {
 
 void draw_measures(Ui& ui, const Box& box, const ScanFrame& frame) {
     const doppler::SpectralMeasures& m = frame.doppler.measures;
-    char words[160];
+    std::string words = tr("PSV, EDV and RI after one beat");
     if (m.beats > 0 && m.psv_cm_s < 0.05) {
-        std::snprintf(words, sizeof words, "PSV –  EDV –  RI –   %s", tr("no flow in the gate"));
+        words = std::string("PSV –  EDV –  RI –   ") + tr("no flow in the gate");
     } else if (m.beats > 0) {
-        std::snprintf(words, sizeof words, tr("PSV %.1f  EDV %.1f cm/s  RI %.2f  flow %.0f ml/min"),
-                      m.psv_cm_s, m.edv_cm_s, m.resistive_index, m.flow_ml_min);
-    } else {
-        std::snprintf(words, sizeof words, "%s", tr("PSV, EDV and RI after one beat"));
+        words = filled(tr("PSV %.1f  EDV %.1f cm/s  RI %.2f  flow %.0f ml/min"), m.psv_cm_s,
+                       m.edv_cm_s, m.resistive_index, m.flow_ml_min);
     }
     ui.text(box, words, Type::small, colour::kImageText, Align::left, true);
 }

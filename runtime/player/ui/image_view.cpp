@@ -270,9 +270,8 @@ void draw_corner_words(Ui& ui, const Box& area, const ImageViewInput& input) {
 
 // "FROZEN", in white; no colour on the picture.
 void draw_frozen_sign(Ui& ui, const Box& area, double cine_age_s) {
-    char words[64];
-    std::snprintf(words, sizeof words, cine_age_s > 0.005 ? "%s  -%.1f s" : "%s", tr("FROZEN"),
-                  cine_age_s);
+    const std::string words =
+        cine_age_s > 0.005 ? filled("%s  -%.1f s", tr("FROZEN"), cine_age_s) : tr("FROZEN");
     const float wide = ui.width(words, Type::bold) + 20;
     const Box sign{area.x + 0.5f * (area.w - wide), area.y + 8, wide, 28};
     ui.fill(sign, colour::rgba(0, 0, 0, 190), 4);
@@ -332,9 +331,8 @@ void draw_stopped(Ui& ui, const Box& area, const ImageViewInput& input, ImagePla
     if (input.stopped_buttons) draw_stopped_buttons(ui, room.take_bottom(48, 8), place);
     Box head = room.take_top(40, 4);
     ui.icon(Icon::warn, head.x, head.y + 8, 24, colour::kWarn);
-    char words[64];
-    std::snprintf(words, sizeof words, tr("for %d:%02d"), static_cast<int>(input.stopped_s) / 60,
-                  static_cast<int>(input.stopped_s) % 60);
+    const std::string words = filled(tr("for %d:%02d"), static_cast<int>(input.stopped_s) / 60,
+                                     static_cast<int>(input.stopped_s) % 60);
     if (input.stopped_s >= 1)
         ui.text(head.take_right(ui.width(words, Type::small) + 4), words, Type::small, colour::kDim,
                 Align::right);

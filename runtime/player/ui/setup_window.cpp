@@ -133,21 +133,13 @@ void draw_setup_drawing(Ui& ui, const Box& box, SetupStep step) {
 
 namespace {
 
-// printf of a translated format.
-template <class... Values>
-std::string filled(const char* format, Values... values) {
-    char line[160];
-    std::snprintf(line, sizeof line, tr(format), values...);
-    return line;
-}
-
 // What a step's list entry says below its title.
 std::string step_words(const SetupGuide& guide, SetupStep step) {
     if (guide.found(step)) return tr("found");
     const bool now = step == guide.step();
     const double left = setup_seconds(step) - (now ? guide.view().seconds : 0);
-    return now && guide.recording() ? filled("%.0f s to go", std::max(left, 0.0))
-                                    : filled("about %.0f s", setup_seconds(step));
+    return now && guide.recording() ? filled(tr("%.0f s to go"), std::max(left, 0.0))
+                                    : filled(tr("about %.0f s"), setup_seconds(step));
 }
 
 void draw_step_list(Ui& ui, const Box& card, SetupGuide& guide) {
@@ -228,7 +220,7 @@ std::optional<std::pair<int, ToolOf>> draw_roles(Ui& ui, Box& room, const SetupP
             there ? filled("%.0f  %.0f  %.0f mm", t.x, t.y, t.z) : std::string(tr("no readings"));
         ui.text(line.take_right(ui.width(where, Type::small) + 4, 6), where, Type::small,
                 there ? colour::kDim : colour::kFaint, Align::right, true);
-        ui.text(line, named ? tracker.sensors[at] : filled("Sensor %d", i + 1), Type::small,
+        ui.text(line, named ? tracker.sensors[at] : filled(tr("Sensor %d"), i + 1), Type::small,
                 there ? colour::kText : colour::kDim, Align::left, true);
         const Box row = room.take_top(30, 8);
         for (int c = 0; c < 3; ++c) {
@@ -243,8 +235,8 @@ std::optional<std::pair<int, ToolOf>> draw_roles(Ui& ui, Box& room, const SetupP
         }
     }
     if (left_out > 0 && room.h > 20)
-        ui.text(room.take_top(20), filled("%d more: make the window taller", left_out), Type::small,
-                colour::kDim, Align::left, true);
+        ui.text(room.take_top(20), filled(tr("%d more: make the window taller"), left_out),
+                Type::small, colour::kDim, Align::left, true);
     return given;
 }
 
@@ -254,7 +246,7 @@ void draw_tracker_words(Ui& ui, Box& room, const SetupPageInput& input) {
             Type::bold, colour::kText, Align::left, true);
     const std::string state =
         input.live && tracker.phase == TrackerPhase::streaming
-            ? filled("%.0f readings per second", tracker.rate_hz)
+            ? filled(tr("%.0f readings per second"), tracker.rate_hz)
             : std::string(tr(phase_name(tracker.phase))) + " · " + tr("no readings");
     ui.text(room.take_top(22, 8), state, Type::small, input.live ? colour::kDim : colour::kWarn,
             Align::left, true);
@@ -273,7 +265,7 @@ void draw_summary(Ui& ui, Box& room, const Calibrations& calibrations) {
         const std::string words = !*calibration ? tr("not calibrated")
                                   : (*calibration)->rms_mm < 0
                                       ? tr("not measured")
-                                      : filled("rms %.2f mm", (*calibration)->rms_mm);
+                                      : filled(tr("rms %.2f mm"), (*calibration)->rms_mm);
         ui.row(room.take_top(28), tr(name), words, *calibration ? colour::kText : colour::kDim);
     }
 }
@@ -357,7 +349,7 @@ void draw_figure(Ui& ui, Box& room, SetupStep step, const SetupView& view) {
     ui.text(row.take_left(ui.width("mm", Type::body) + 2, 12), "mm", Type::body, colour::kDim);
     if (reached) ui.icon(Icon::pass, row.x, row.y + 0.5f * row.h - 9, 18, colour::kGood);
     if (reached) row.take_left(24);
-    ui.text(row, filled("needed %.1f mm", needed), Type::small,
+    ui.text(row, filled(tr("needed %.1f mm"), needed), Type::small,
             reached ? colour::kGood : colour::kDim, Align::left, true);
 }
 
@@ -368,7 +360,7 @@ void draw_measure(Ui& ui, Box room, const SetupGuide& guide) {
     const double expected = setup_seconds(step);
     if (room.h > 130) {
         Box time = room.take_bottom(24, 8);
-        const std::string left = filled("%.0f s", std::max(expected - view.seconds, 0.0));
+        const std::string left = filled(tr("%.0f s"), std::max(expected - view.seconds, 0.0));
         ui.text(time.take_right(ui.width("00 s", Type::bold) + 4, 8), left, Type::bold,
                 colour::kText, Align::right);
         const Box groove{time.x, time.y + 9, time.w, 6};
@@ -384,7 +376,7 @@ void draw_measure(Ui& ui, Box room, const SetupGuide& guide) {
             8);
     if (!view.residuals_mm.empty() && room.h > 90) {
         if (room.h > 130)
-            ui.text(room.take_top(20), filled("Readings disagree by %.2f mm", view.rms_mm),
+            ui.text(room.take_top(20), filled(tr("Readings disagree by %.2f mm"), view.rms_mm),
                     Type::small, colour::kDim, Align::left, true);
         draw_course(ui, room.take_top(56, 12), view.residuals_mm);
     }
@@ -392,15 +384,16 @@ void draw_measure(Ui& ui, Box room, const SetupGuide& guide) {
         Box row = room.take_top(std::min(room.h, 180.0f));
         draw_tilts(ui, row.take_left(std::min(row.h, 0.6f * row.w), 16), *view.tilts);
         ui.text(row.take_top(22), tr("Tilts"), Type::bold, colour::kText, Align::left, true);
-        ui.text(row.take_top(26, 4), filled("%d of %d", view.tilts->count(), TiltFields::kCount),
-                Type::bold, colour::kText, Align::left, true);
+        ui.text(row.take_top(26, 4),
+                filled(tr("%d of %d"), view.tilts->count(), TiltFields::kCount), Type::bold,
+                colour::kText, Align::left, true);
         ui.paragraph(row, tr("The dot is the tool: lean it into the empty fields."), Type::small,
                      colour::kDim, true);
     } else if (room.h > 30) {
         ui.row(room.take_top(26),
                tr(step == SetupStep::needle ? "Depths recorded" : "Movement covered"),
-               step == SetupStep::needle ? filled("%d of %d", view.recordings, 3)
-                                         : filled("%.0f %%", 100 * view.coverage));
+               step == SetupStep::needle ? filled(tr("%d of %d"), view.recordings, 3)
+                                         : filled(tr("%.0f %%"), 100 * view.coverage));
     }
 }
 
@@ -420,8 +413,9 @@ void draw_step(Ui& ui, Box room, SetupGuide& guide, const SetupPageInput& input)
     const SetupStep step = guide.step();
     const bool roomy = room.h > 260;
     if (roomy)
-        ui.text(room.take_top(22), filled("Step %d of %d", static_cast<int>(step) + 1, kSetupSteps),
-                Type::small, colour::kDim);
+        ui.text(room.take_top(22),
+                filled(tr("Step %d of %d"), static_cast<int>(step) + 1, kSetupSteps), Type::small,
+                colour::kDim);
     if (roomy)
         ui.text(room.take_top(38, 4), tr(setup_title(step)),
                 ui.width(tr(setup_title(step)), Type::title) < room.w ? Type::title : Type::heading,
@@ -483,7 +477,7 @@ bool may_go_on(const SetupGuide& guide, const SetupPageInput& input, std::string
     if (guide.recording()) why = tr("Stop the recording first.");
     if (guide.recording()) return false;
     if (!guide.view().good_enough)
-        why = filled("Next opens when it is known to %.1f mm and has moved enough.",
+        why = filled(tr("Next opens when it is known to %.1f mm and has moved enough."),
                      setup_needed_mm(step));
     return guide.view().good_enough;
 }

@@ -45,7 +45,6 @@ StandingWords standing_words(const Progress& progress,
     const Standing now =
         standing(progress.history, card.case_name, exercise.name, exercise.mastery);
     StandingWords out;
-    char words[96];
     const std::string best =
         now.best_mm >= 0 ? std::string(" · ") + tr("best") + text(" %.1f mm", now.best_mm) : "";
     if (now.attempts == 0) {
@@ -59,13 +58,12 @@ StandingWords standing_words(const Progress& progress,
             out.words = tr("Mastered") + best;
             return out;
         }
-        std::snprintf(words, sizeof words, tr("Passed %d of %d"), now.passes, now.attempts);
+        out.words = filled(tr("Passed %d of %d"), now.passes, now.attempts) + best;
     } else {
         out.icon = Icon::fail;
         out.packed = colour::kBad;
-        std::snprintf(words, sizeof words, tr("Not passed in %d"), now.attempts);
+        out.words = filled(tr("Not passed in %d"), now.attempts) + best;
     }
-    out.words = words + best;
     return out;
 }
 
@@ -117,9 +115,8 @@ float draw_case(const Progress& progress,
     }
     const std::string title = card && !card->title.empty() ? card->title : entry.name;
     ui.text(room.take_top(26), title, Type::heading, colour::kText, Align::left, true);
-    char line[160];
-    std::snprintf(line, sizeof line, tr("%s · %.1f MB · exercises: %zu"), entry.name.c_str(),
-                  entry.megabytes, rows);
+    const std::string line =
+        filled(tr("%s · %.1f MB · exercises: %zu"), entry.name.c_str(), entry.megabytes, rows);
     ui.text(room.take_top(22), line, Type::small, colour::kDim, Align::left, true);
     for (std::size_t i = 0; i < rows; ++i) {
         const CaseCard::Exercise& exercise = card->exercises[i];

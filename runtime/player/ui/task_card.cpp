@@ -118,11 +118,18 @@ std::string done_words(const TaskCardInput& input, const ProcedureState& state) 
     return line;
 }
 
-// What the values and the hints of the card take below what stands above them.
+float below_values(const Ui& ui, float width, const TaskCardInput& input) {
+    if (!input.attempt) return 0;
+    return 4 + (input.exam ? 40 : hint_height(ui, width, hint_words(input)));
+}
+
+// What the values and the hints of the card take below what stands above them. Before the needle
+// is used its values say nothing: then the task's words go first.
 float kept_free(const Ui& ui, float width, const TaskCardInput& input) {
     if (!input.attempt) return 3 * kRow;
-    const float rows = input.exam ? 1 : input.shows_targets ? 3 : 2;
-    return 10 + rows * kRow + (input.exam ? 40 : hint_height(ui, width, hint_words(input)));
+    const bool used = input.record.tools.has_needle || input.attempt->view().insertions > 0;
+    const float rows = !used ? 0 : input.exam ? 1 : input.shows_targets ? 3 : 2;
+    return 6 + rows * kRow + below_values(ui, width, input);
 }
 
 // Small words where they fit whole.
@@ -157,8 +164,9 @@ void draw_values(Ui& ui, Box& room, const TaskCardInput& input) {
     const FrameRecord& record = input.record;
     const bool needle = input.live && record.tools.has_needle;
     const Point3 tip = record.needle.mannequin_from_drawn * Point3{0, 0, 0};
+    const float below = below_values(ui, room.w, input);
     const auto row = [&](const char* name, const std::string& value, unsigned packed) {
-        if (room.h < kRow) return;
+        if (room.h < kRow + below) return;
         ui.row(room.take_top(kRow), tr(name), value, packed);
     };
     if (input.shows_targets && !input.exam) {
@@ -228,10 +236,10 @@ void draw_procedure_steps(Ui& ui, Box& room, const TaskCardInput& input) {
             draw_step_tab(ui, tabs.column(i, count, 4), i + 1,
                           view.steps[static_cast<std::size_t>(i)]);
     } else {
-        char line[48];
-        std::snprintf(line, sizeof line, tr("Step %d of %d"),
-                      view.present_step < 0 ? count : view.present_step + 1, count);
-        ui.text(room.take_top(20, 4), line, Type::small, colour::kDim);
+        ui.text(room.take_top(20, 4),
+                filled(tr("Step %d of %d"), view.present_step < 0 ? count : view.present_step + 1,
+                       count),
+                Type::small, colour::kDim);
     }
     const bool over = view.present_step < 0;
     const ExerciseTexts::Step* step =
@@ -386,13 +394,10 @@ void draw_hints(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& 
     ui.card(card, "hint", colour::kRaised);
     Box head = card.take_top(44);
     ui.icon(Icon::hint, head.x + 10, head.y + 13, 18, colour::kDim);
-    char line[64];
-    if (input.hints_shown == 0) {
-        std::snprintf(line, sizeof line, tr("%d hints"), count + 1);
-    } else {
-        std::snprintf(line, sizeof line, tr("Hint %d of %d"),
-                      std::min(input.hints_shown, count + 1), count + 1);
-    }
+    const std::string line =
+        input.hints_shown == 0
+            ? filled(tr("%d hints"), count + 1)
+            : filled(tr("Hint %d of %d"), std::min(input.hints_shown, count + 1), count + 1);
     if (input.hints_shown <= count) {
         ButtonStyle style;
         style.link = true;
@@ -415,10 +420,9 @@ void draw_guide(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& 
     ui.card(card, "guide", colour::kRaised);
     ui.fill({card.x, card.y + 6, 4, card.h - 12}, colour::kAccent, 2);
     card = card.inset(14, 8);
-    char line[48];
-    std::snprintf(line, sizeof line, tr("Step %d of %d"), static_cast<int>(step) + 1,
-                  kGuideSteps + 1);
-    ui.text(card.take_top(20), line, Type::small, colour::kDim);
+    ui.text(card.take_top(20),
+            filled(tr("Step %d of %d"), static_cast<int>(step) + 1, kGuideSteps + 1), Type::small,
+            colour::kDim);
     ui.text(card.take_top(26), tr(guide_title(step)), Type::bold, colour::kText, Align::left, true);
     ButtonStyle style;
     style.link = true;
@@ -445,14 +449,11 @@ void draw_head(Ui& ui, Box& room, const TaskCardInput& input) {
     const float line = ui.line_height(Type::heading);
     const float high = std::min(ui.paragraph_height(room.w, title, Type::heading), 2 * line + 1);
     ui.paragraph(room.take_top(high, 4), title, Type::heading, colour::kText, true);
-    char words[80];
-    if (input.attempt && input.difficulty != 0) {
-        std::snprintf(words, sizeof words, tr(attempt_words(input.difficulty)),
-                      input.attempt_number);
-    } else {
-        std::snprintf(words, sizeof words, tr("Attempt %d · difficulty %d of 5"),
-                      input.attempt_number, exercise.difficulty);
-    }
+    const std::string words =
+        input.attempt && input.difficulty != 0
+            ? filled(tr(attempt_words(input.difficulty)), input.attempt_number)
+            : filled(tr("Attempt %d · difficulty %d of 5"), input.attempt_number,
+                     exercise.difficulty);
     Box second = room.take_top(22, 8);
     if (input.attempt) {
         const std::string time = clock_words(input.attempt->view().seconds);

@@ -31,10 +31,10 @@ void sensor_row(const char* tool, const SensorReading* reading, SensorVerdict ve
         ImGui::PushFont(fonts().small);
         ImGui::TextDisabled("  %.1f  %.1f  %.1f mm", t.x, t.y, t.z);
         if (reading->quality >= 0) {
-            char words[48];
-            std::snprintf(words, sizeof words, tr("quality %.0f %%"), 100.0 * reading->quality);
-            ImGui::SameLine(ImGui::GetWindowContentRegionMax().x - ImGui::CalcTextSize(words).x);
-            ImGui::TextDisabled("%s", words);
+            const std::string words = filled(tr("quality %.0f %%"), 100.0 * reading->quality);
+            ImGui::SameLine(ImGui::GetWindowContentRegionMax().x -
+                            ImGui::CalcTextSize(words.c_str()).x);
+            ImGui::TextDisabled("%s", words.c_str());
         }
         ImGui::PopFont();
     }
@@ -63,14 +63,13 @@ void calibration_row(const char* tool, const std::optional<Calibration>& calibra
 
 // Where a recording or script is, and how fast it runs.
 void draw_pace(PacedTracker& paced) {
-    char text[64];
     const double at = paced.at_s(), whole = paced.duration_s();
-    std::snprintf(text, sizeof text,
-                  tr(paced.speed() == 0 ? "%.1f of %.1f s, still" : "%.1f of %.1f s"), at, whole);
+    const std::string text =
+        filled(tr(paced.speed() == 0 ? "%.1f of %.1f s, still" : "%.1f of %.1f s"), at, whole);
     float place = static_cast<float>(at);
     small_dim(tr("Place in the recording, and its speed"));
     ImGui::SetNextItemWidth(-1);
-    if (ImGui::SliderFloat("##place", &place, 0, static_cast<float>(whole), text)) {
+    if (ImGui::SliderFloat("##place", &place, 0, static_cast<float>(whole), text.c_str())) {
         paced.jump(place - at);
     }
     float speed = static_cast<float>(paced.speed());

@@ -6,6 +6,8 @@
 // it, with the same fields.
 #pragma once
 
+#include <algorithm>
+#include <cstdio>
 #include <set>
 #include <span>
 #include <string>
@@ -41,6 +43,16 @@ const std::set<std::string>& missing_words();
 const char* translation(const char* english);
 // The words in the language in use; those that the catalogue lacks as they are.
 const char* tr(const char* english);
+
+// A format of printf and its values, whatever their length: a language may need more letters than
+// English.
+template <class... Values>
+std::string filled(const char* format, const Values&... values) {
+    const int length = std::snprintf(nullptr, 0, format, values...);
+    std::string out(static_cast<std::size_t>(std::max(length, 0)), ' ');
+    std::snprintf(out.data(), out.size() + 1, format, values...);
+    return out;
+}
 
 // What is put together before it reaches the window (notices, errors, messages of trackers), in the
 // language in use: the format and each argument are translated by themselves, and what the

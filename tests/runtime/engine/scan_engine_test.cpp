@@ -200,7 +200,9 @@ TEST_F(Engine, ToolsAreLostWithTheReferenceAndComeBack) {
             }
             for (int i = 0; i < 60; ++i) {
                 const ToolPoses tools = step(false);
-                if (i >= 18) EXPECT_FALSE(tools.has_probe || tools.has_needle) << i;  // 0.3 s
+                if (i >= 18) {  // 0.3 s
+                    EXPECT_FALSE(tools.has_probe || tools.has_needle) << i;
+                }
             }
             const SensorVerdict verdict = engine->reference_verdict(t);
             EXPECT_TRUE(verdict == SensorVerdict::lost || verdict == SensorVerdict::stale);

@@ -12,9 +12,7 @@
 namespace sonocase::runtime::inline player_ui_parts {
 
 std::string text(const char* format, double value) {
-    char line[64];
-    std::snprintf(line, sizeof line, format, value);
-    return line;
+    return filled(format, value);
 }
 
 void small_dim(const char* words) {

@@ -309,6 +309,15 @@ TEST_F(Words, EveryNoticeIsInTheCatalogue) {
     }
 }
 
+// "... Pfeil hoch fuehrt dort." is longer than "... arrow up leads there.": nothing is cut.
+TEST_F(Words, AFormatIsFilledWhateverItsLength) {
+    const std::string words(500, 'w');
+    EXPECT_EQ(filled((words + " %d " + words).c_str(), 7), words + " 7 " + words);
+    EXPECT_EQ(filled("%s", words.c_str()), words);
+    EXPECT_EQ(filled("%.1f mm", 1e300).size(), 306u);
+    EXPECT_EQ(filled(""), "");
+}
+
 TEST(Languages, AreChosenByCodeOrLocaleAndElseEnglish) {
     for (const char* code : {"de", "de_AT.UTF-8", "de-CH"}) {
         use_language(code);
