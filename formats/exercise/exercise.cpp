@@ -319,6 +319,8 @@ Exercise read_exercise(const TomlTable& root) {
         table->number("stiffness_scale", d.stiffness_scale, 0.05, 20);
         table->number("press_offset_mm", d.press_offset_mm, 0, 40);
         table->number("force_limit_n", d.force_limit_n, 0.1, 200);
+        table->number("vein_level_mm", d.vein_level_mm, -2, 2);
+        table->number("vein_swell_mm", d.vein_swell_mm, 0, 2);
         table->finish();
     }
     for (const TomlTable& table : root.tables("pass_marks")) read_pass_mark(table, e.pass_marks);

@@ -118,6 +118,9 @@ struct Deformation {
     double stiffness_scale = 1;       // of every tissue
     double press_offset_mm = 0;       // how far the probe is pressed in at the start
     double force_limit_n = 15;        // for the score of the time above it
+    // Walls of veins with the table level and quiet breath, beyond those of the case; and how much
+    // farther out the highest pressure drives them (vein_state() in motion.h). At most two voxels.
+    double vein_level_mm = 0, vein_swell_mm = 0;
 };
 
 struct Exercise {

@@ -53,6 +53,19 @@ double pulse_wave(double phase) {
     return (1 - t) * (1 - t) * (1 + 2 * t);
 }
 
+VeinState vein_state(const Deformation& deformation, double head_down_deg, bool strains) {
+    constexpr double kColumnMm = 200, kMmhgPerMm = 0.078;  // blood: 1.06 times water
+    constexpr double kStrainMmhg = 20, kFullMmhg = 2.7, kMaxDeg = 45;
+    const double angle = std::clamp(head_down_deg, -kMaxDeg, kMaxDeg) * kTwoPi / 360;
+    const double more = kColumnMm * kMmhgPerMm * sine(angle) + (strains ? kStrainMmhg : 0);
+    VeinState out;
+    out.pressure_mmhg = std::max(0.5, deformation.venous_pressure_mmhg + more);
+    out.wall_mm =
+        deformation.vein_level_mm +
+        deformation.vein_swell_mm * std::clamp(1 - exponential(-more / kFullMmhg), -0.5, 1.0);
+    return out;
+}
+
 MotionState motion_at(const BreathingMotion& breathing, const Pulsation& pulsation, double time_s) {
     MotionState m;
     const double length = norm(breathing.direction);

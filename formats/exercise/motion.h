@@ -20,12 +20,22 @@ namespace sonocase {
 struct MotionState {
     Vector3 breathing_mm;  // shift where the weight is 1
     double pulse_mm = 0;   // outward shift of arterial walls
+    double vein_mm = 0;    // of the walls of veins: VeinState::wall_mm; not of the time
     bool breathes() const {
         return breathing_mm.x != 0 || breathing_mm.y != 0 || breathing_mm.z != 0;
     }
 };
 
 MotionState motion_at(const BreathingMotion& breathing, const Pulsation& pulsation, double time_s);
+
+// How full veins are. Head down by some degrees, blood stands 200 mm sin(angle) higher in the neck;
+// straining adds 20 mmHg (both assumed). Walls move out by vein_swell_mm times 1 - exp(-dP / 2.7
+// mmHg), so that 10 and 15 degrees give the published gain in area (docs/procedures.md).
+struct VeinState {
+    double pressure_mmhg = 0;  // that makes them stiff
+    double wall_mm = 0;        // outward shift of their walls beyond those of the case
+};
+VeinState vein_state(const Deformation& deformation, double head_down_deg, bool strains);
 
 // Shape of one heart beat, phase in [0, 1): fast rise, slow fall, in [0, 1].
 double pulse_wave(double phase);

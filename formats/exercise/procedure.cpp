@@ -278,6 +278,10 @@ std::vector<TrayAct> procedure_tray(const Procedure& procedure) {
     for (const ProcedureStep& step : procedure.steps)
         for (const Condition* c : {&step.entry, &step.done}) add(*c);
     for (const ProcedureItem& item : procedure.items) add(item.condition);
+    // Two ways to the same end: whoever may tip the table may ask the patient to strain.
+    bool &tilt = asked[static_cast<std::size_t>(ActKind::tilt)],
+         &strain = asked[static_cast<std::size_t>(ActKind::valsalva)];
+    tilt = strain = tilt || strain;
     static const TrayAct kAll[] = {{{ActKind::inject, 0, 1}, "Inject 1 ml"},
                                    {{ActKind::aspirate, 0, 1}, "Draw back 1 ml"},
                                    {{ActKind::core_throw, 0, 15}, "Throw 15 mm"},
@@ -290,7 +294,11 @@ std::vector<TrayAct> procedure_tray(const Procedure& procedure) {
                                    {{ActKind::drain, 0, 5}, "Drain 5 ml"},
                                    {{ActKind::compress, 0, 1}, "Press on it"},
                                    {{ActKind::compress, 0, 0}, "Let go"},
-                                   {{ActKind::rescan, 0, 1}, "I looked again"}};
+                                   {{ActKind::rescan, 0, 1}, "I looked again"},
+                                   {{ActKind::tilt, 0, 15}, "Head down 15 degrees"},
+                                   {{ActKind::tilt, 0, 0}, "Table level"},
+                                   {{ActKind::valsalva, 0, 1}, "Ask to strain"},
+                                   {{ActKind::valsalva, 0, 0}, "Breathe again"}};
     std::vector<TrayAct> tray;
     for (const TrayAct& one : kAll)
         if (asked[static_cast<std::size_t>(one.act.kind)]) tray.push_back(one);

@@ -106,6 +106,9 @@ struct SceneChange {
     // Radius of the first targets over that as drawn: they shrink as they are drained.
     std::array<double, kMaxTargets> target_scale{1, 1, 1, 1, 1, 1, 1, 1};
     Line wire, catheter;
+    // How full the veins are: outward shift of their walls, and the pressure in them; 0: that of
+    // the exercise.
+    double vein_wall_mm = 0, venous_pressure_mmhg = 0;
 };
 
 inline constexpr int kMaxSteps = 32, kMaxItems = 64;

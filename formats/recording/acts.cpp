@@ -12,7 +12,7 @@ namespace sonocase {
 const std::vector<std::string>& act_names() {
     static const std::vector<std::string> names{"inject", "aspirate", "core_throw", "wire",
                                                 "dilate", "catheter", "drain",      "compress",
-                                                "rescan", "answer"};
+                                                "rescan", "answer",   "tilt",       "valsalva"};
     return names;
 }
 

@@ -24,8 +24,10 @@ enum class ActKind : std::uint8_t {
     compress,    // 1: a hand presses on the puncture; 0: it lets go
     rescan,      // the trainee says: I look once more
     answer,      // index: item; amount: the option chosen, from 0
+    tilt,        // the table: degrees head down; 0: level
+    valsalva,    // 1: the patient strains against closed lips; 0: breathes again
 };
-inline constexpr int kActKinds = 10;
+inline constexpr int kActKinds = 12;
 const std::vector<std::string>& act_names();  // in the order of the enumeration
 
 struct Act {

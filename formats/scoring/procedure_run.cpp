@@ -8,6 +8,7 @@
 
 #include "formats/base/constants.h"
 #include "formats/base/portable_math.h"
+#include "formats/exercise/motion.h"
 #include "formats/scoring/session_monitor.h"
 #include "formats/text/number_text.h"
 #include "formats/volume/tissue.h"
@@ -523,6 +524,8 @@ void ProcedureRun::act(const Act& act, const Facts& f) {
             return;
         case ActKind::compress: state_.compressing = act.amount > 0; return;
         case ActKind::rescan: return;
+        case ActKind::tilt: state_.head_down_deg = std::clamp(act.amount, -45.0, 45.0); return;
+        case ActKind::valsalva: state_.strains = act.amount > 0; return;
         case ActKind::answer: {
             const auto& items = exercise_->procedure.items;
             if (act.index < 0 || act.index >= static_cast<int>(items.size())) return;
@@ -836,6 +839,10 @@ SceneChange ProcedureRun::scene() const {
             out.target_scale[t] = std::cbrt(left_ml_[t] / full_ml_[t]);
     out.wire = wire_;
     out.catheter = catheter_;
+    const VeinState veins =
+        vein_state(exercise_->deformation, state_.head_down_deg, state_.strains);
+    out.vein_wall_mm = veins.wall_mm;
+    out.venous_pressure_mmhg = veins.pressure_mmhg;
     return out;
 }
 
@@ -914,6 +921,8 @@ std::vector<TrayAct> tray_now(const Procedure& procedure, const ProcedureState& 
     std::erase_if(tray, [&](const TrayAct& one) {
         const bool on = one.act.amount > 0;
         if (one.act.kind == ActKind::compress) return on == state.compressing;
+        if (one.act.kind == ActKind::tilt) return on == (state.head_down_deg > 0);
+        if (one.act.kind == ActKind::valsalva) return on == state.strains;
         return one.act.kind == ActKind::catheter && on == state.catheter_in;
     });
     return tray;

@@ -28,6 +28,8 @@
 //   catheter    over the wire, or over the needle where there is no wire; lies at the tip
 //   drain       lets fluid out of the collection that catheter or tip lie in, as long as there is
 //               any
+//   tilt        head down by degrees: veins of the neck fill (formats/exercise/motion.h)
+//   valsalva    the patient strains: they fill more
 //   compress    counts the seconds; bleeding stops after 30 s of it
 // Bleeding gives 0.2 ml/s into a pool, at most 60 ml.
 #pragma once
@@ -109,6 +111,8 @@ struct ProcedureState {
     int wire_label = 0;
     double compressed_s = 0, bleeding_compressed_s = 0;
     bool compressing = false;
+    double head_down_deg = 0;  // of the table
+    bool strains = false;      // against closed lips
     int bleeding_pool = -1;
 };
 

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "formats/base/constants.h"
+#include "pipeline/anatomy/neck_anatomy.h"
 #include "pipeline/anatomy/torso_anatomy.h"
 #include "pipeline/base/parallel.h"
 
@@ -19,6 +20,10 @@ const TorsoAnatomy& anatomy_of(const AnalyticBody& body) {
     return body.tubes ? tube_phantom() : torso_anatomy();
 }
 
+NeckAnatomy neck_of(const AnalyticBody& body) {
+    return NeckAnatomy(static_cast<std::uint64_t>(body.neck_seed));
+}
+
 // From a body to the standard torso: organs follow the change of proportions.
 Point3 standard_point(Point3 p, const AnalyticBody& body) {
     return {p.x / body.width_scale, p.y / body.depth_scale, p.z};
@@ -27,7 +32,7 @@ Point3 standard_point(Point3 p, const AnalyticBody& body) {
 }  // namespace
 
 std::vector<std::string> analytic_body_names() {
-    return {"standard", "slender", "flow-phantom"};
+    return {"standard", "slender", "flow-phantom", "neck"};
 }
 
 std::optional<AnalyticBody> analytic_body(std::string_view name) {
@@ -39,14 +44,20 @@ std::optional<AnalyticBody> analytic_body(std::string_view name) {
         body.tubes = true;
         return body;
     }
+    if (name == "neck") {
+        AnalyticBody body;
+        body.neck_seed = 1;
+        return body;
+    }
     return std::nullopt;
 }
 
 std::vector<Label> analytic_torso_labels(const AnalyticBody& body) {
-    return anatomy_of(body).labels;
+    return body.neck_seed != 0 ? NeckAnatomy::labels() : anatomy_of(body).labels;
 }
 
 std::uint8_t analytic_torso_label(Point3 ct, const AnalyticBody& body) {
+    if (body.neck_seed != 0) return neck_of(body).label(ct);
     const Point3 p = standard_point(ct, body);
     const auto& solids = anatomy_of(body).solids;
     if (!inside(solids.front(), p, body.belly_mm)) return 0;
@@ -75,13 +86,17 @@ double analytic_torso_signed_distance(int label, Point3 ct, double reach_mm) {
     return region;
 }
 
-Grid analytic_torso_grid(Vector3 spacing_mm) {
+Grid analytic_torso_grid(Vector3 spacing_mm, const AnalyticBody& body) {
     Grid grid;
     grid.spacing_mm = spacing_mm;
-    const Vector3 half{175, 130, kTorsoHalfHeightMm};
+    const bool neck = body.neck_seed != 0;
+    const Vector3 half = neck ? Vector3{97, 75, 0.5 * (kNeckHighMm - kNeckLowMm)}
+                              : Vector3{175, 130, kTorsoHalfHeightMm};
+    const Vector3 middle =
+        neck ? Vector3{0, -4, 0.5 * (kNeckHighMm + kNeckLowMm)} : Vector3{0, 0, 0};
     for (int a = 0; a < 3; ++a) {
         grid.size[a] = static_cast<int>(std::floor(2 * half[a] / spacing_mm[a])) + 1;
-        grid.origin_mm[a] = -0.5 * spacing_mm[a] * (grid.size[a] - 1);
+        grid.origin_mm[a] = middle[a] - 0.5 * spacing_mm[a] * (grid.size[a] - 1);
     }
     return grid;
 }
@@ -89,6 +104,24 @@ Grid analytic_torso_grid(Vector3 spacing_mm) {
 LabelVolume sample_analytic_torso(const Grid& grid, const AnalyticBody& body) {
     LabelVolume out{grid, std::vector<std::uint8_t>(grid.voxel_count()),
                     analytic_torso_labels(body)};
+    if (body.neck_seed != 0) {
+        const NeckAnatomy neck = neck_of(body);
+        parallel_for(grid.size.z, 1, [&](std::size_t begin, std::size_t end) {
+            for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
+                const NeckAnatomy::Section section =
+                    neck.section(grid.point_from_voxel({0, 0, static_cast<double>(k)}).z);
+                for (int j = 0; j < grid.size.y; ++j) {
+                    for (int i = 0; i < grid.size.x; ++i) {
+                        const Point3 p =
+                            grid.point_from_voxel({static_cast<double>(i), static_cast<double>(j),
+                                                   static_cast<double>(k)});
+                        out.voxels[grid.index(i, j, k)] = neck.label(section, p.x, p.y);
+                    }
+                }
+            }
+        });
+        return out;
+    }
     parallel_for(grid.size.z, 1, [&](std::size_t begin, std::size_t end) {
         for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
             for (int j = 0; j < grid.size.y; ++j) {
@@ -132,7 +165,7 @@ Registration analytic_torso_truth(double strength, const AnalyticBody& body) {
             }
         }
     }
-    truth.ct_box = analytic_torso_grid({1, 1, 1}).bounds();
+    truth.ct_box = analytic_torso_grid({1, 1, 1}, body).bounds();
     return truth;
 }
 
@@ -159,8 +192,12 @@ class Gaussian {
 Surface analytic_torso_mannequin(const AnalyticMannequinOptions& options,
                                  const AnalyticBody& body) {
     const Registration truth = analytic_torso_truth(options.strength, body);
-    const double low = -kTorsoHalfHeightMm - 30, high = kTorsoHalfHeightMm + 30;
+    const bool is_neck = body.neck_seed != 0;
+    const double low = (is_neck ? kNeckLowMm : -kTorsoHalfHeightMm) - 30;
+    const double high = (is_neck ? kNeckHighMm : kTorsoHalfHeightMm) + 30;
+    const std::optional<NeckAnatomy> neck = is_neck ? std::optional(neck_of(body)) : std::nullopt;
     const auto skin_point = [&](double theta, double z) {
+        if (neck) return mannequin_from_ct(truth, neck->skin_point(theta, z));
         const Point3 p = trunk_point(theta, z, 0, body.belly_mm);
         return mannequin_from_ct(truth, {p.x * body.width_scale, p.y * body.depth_scale, p.z});
     };
@@ -223,6 +260,7 @@ std::vector<AnalyticLandmark> analytic_torso_landmarks(int count,
     const Registration truth = analytic_torso_truth(options.strength, body);
     Gaussian noise(options.seed + 1000);
     std::vector<AnalyticLandmark> marks;
+    if (body.neck_seed != 0) return marks;
     for (const auto& place : places) {
         if (static_cast<int>(marks.size()) >= count) break;
         const Point3 p = trunk_point(place.theta, place.z, 0, body.belly_mm);

@@ -28,12 +28,14 @@ struct AnalyticBody {
     double belly_mm = 12;    // how far the belly protrudes, [0, 40]
     int warp = 1;            // which of the known warps makes the mannequin, 1 or 2
     bool tubes = false;      // no organs, but straight tubes of blood: a flow phantom
+    int neck_seed = 0;       // not 0: the neck of this seed (neck_anatomy.h) in the torso's place
 };
 
 // The bodies that a recipe can name: "standard"; "slender", which is narrower and shallower and
 // whose mannequin is made by the second warp; and "flow-phantom", skin and one even material with
 // straight tubes of 4, 6, 8 and 12 mm and one of 10 mm with a stenosis of 6 mm, 50 degrees from a
-// beam straight down. Empty for any other name.
+// beam straight down; "neck", the neck by rule of seed 1, without scaling. Empty for any other
+// name.
 std::optional<AnalyticBody> analytic_body(std::string_view name);
 std::vector<std::string> analytic_body_names();
 
@@ -52,7 +54,7 @@ double analytic_torso_signed_distance(int label, Point3 ct, double reach_mm = 30
 // Labels at the voxel centres. Same bytes for any number of threads.
 LabelVolume sample_analytic_torso(const Grid& grid, const AnalyticBody& body = {});
 // Grid over the whole patient, who is cut at the top and bottom as in any abdominal CT.
-Grid analytic_torso_grid(Vector3 spacing_mm);
+Grid analytic_torso_grid(Vector3 spacing_mm, const AnalyticBody& body = {});
 
 // The map that made the mannequin: rigid and quadratic parts, no residual. The quadratic part moves
 // the skin by 9 mm on average; the smallest det J over the patient's box is above 0.6. `strength`
@@ -73,8 +75,8 @@ Surface analytic_torso_mannequin(const AnalyticMannequinOptions& options = {},
                                  const AnalyticBody& body = {});
 
 // Landmarks of the skin on both bodies: navel, tip of the breastbone, costal margins, hip bones,
-// pubis, ribs, loins, spinous processes. At most fourteen; noise_mm per axis is the error of
-// pointing, on the mannequin only.
+// pubis, ribs, loins, spinous processes. At most fourteen, of a neck none; noise_mm per axis is the
+// error of pointing, on the mannequin only.
 struct AnalyticLandmark {
     std::string name;
     Point3 ct, mannequin;

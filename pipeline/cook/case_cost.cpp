@@ -37,7 +37,8 @@ double nodes_between_slices(Vector3 spacing_mm, double voxels) {
 // Organ meshes are not turned into voxels twice.
 Result<LabelVolume> labels_of(const Recipe& recipe) {
     if (recipe.inputs.analytic)
-        return sample_analytic_torso(analytic_torso_grid({4, 4, 4}), recipe.inputs.torso.body);
+        return sample_analytic_torso(analytic_torso_grid({4, 4, 4}, recipe.inputs.torso.body),
+                                     recipe.inputs.torso.body);
     if (is_mesh_source(recipe.resolve(recipe.inputs.labels)))
         return Error{"organ meshes have no voxels yet", recipe.inputs.labels, ""};
     SONOCASE_TRY(auto imported, import_inputs(recipe, {}, {}));
@@ -59,7 +60,7 @@ double region_voxels(const Recipe& recipe, const RegionRequest& region) {
 
 // How many voxels the boxes of the labels have, for one of the map: distances are measured in them.
 double box_share(const AnalyticBody& body) {
-    const LabelVolume map = sample_analytic_torso(analytic_torso_grid({8, 8, 8}), body);
+    const LabelVolume map = sample_analytic_torso(analytic_torso_grid({8, 8, 8}, body), body);
     double voxels = 0;
     for (std::size_t l = 1; l < map.labels.size(); ++l) {
         const Box3 box = box_of_label(map, map.labels[l].name, 0);
@@ -76,11 +77,12 @@ CaseSize case_size(const Recipe& recipe) {
     CaseSize size;
     if (recipe.inputs.analytic) {
         const AnalyticInput& in = recipe.inputs.torso;
-        const Grid grid = analytic_torso_grid({in.voxel_mm, in.voxel_mm, in.slice_mm});
+        const Grid grid = analytic_torso_grid({in.voxel_mm, in.voxel_mm, in.slice_mm}, in.body);
         const auto voxels = static_cast<double>(grid.voxel_count());
         size.label_voxels = voxels / 1e6;
         // A phantom's tubes have small boxes; the law is that of a torso's organs.
-        if (in.body.tubes) size.label_voxels *= std::min(1.0, box_share(in.body) / box_share({}));
+        if (in.body.tubes || in.body.neck_seed != 0)
+            size.label_voxels *= std::min(1.0, box_share(in.body) / box_share({}));
         size.interpolated_nodes = nodes_between_slices(grid.spacing_mm, voxels);
     } else if (is_mesh_source(recipe.resolve(recipe.inputs.labels))) {
         if (const auto grid = mesh_inputs_grid(recipe))

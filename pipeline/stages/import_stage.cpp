@@ -19,7 +19,7 @@ LabelFile sample_analytic(const AnalyticInput& in) {
     file.frame = "ct";
     const double across = in.voxel_mm;
     file.volume =
-        sample_analytic_torso(analytic_torso_grid({across, across, in.slice_mm}), in.body);
+        sample_analytic_torso(analytic_torso_grid({across, across, in.slice_mm}, in.body), in.body);
     StageReport report;
     report.stage = stage_names::kImport;
     report.version = kImportVersion;
@@ -150,7 +150,7 @@ std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& dig
     if (in.analytic)
         return {key_text(body.tubes ? "tubes" : "analytic",
                          {body.width_scale, body.depth_scale, body.belly_mm, in.torso.voxel_mm,
-                          in.torso.slice_mm})};
+                          in.torso.slice_mm, static_cast<double>(body.neck_seed)})};
     const std::string files = digests.labels + " " + digests.label_table;
     if (is_mesh_source(recipe.resolve(in.labels)))
         return {key_text(files + " axes " + in.labels_axes,

@@ -24,12 +24,13 @@ std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& dig
         return {key_text(digests.surface + " axes " + in.surface_axes, {in.surface_scale})};
     const AnalyticInput& torso = in.torso;
     const AnalyticMannequinOptions& made = torso.mannequin;
-    return {
-        key_text("analytic", {torso.body.width_scale, torso.body.depth_scale, torso.body.belly_mm,
-                              made.noise_mm, made.strength, static_cast<double>(made.points),
-                              made.mesh ? 1.0 : 0.0, made.front_only ? 1.0 : 0.0,
-                              static_cast<double>(made.seed), static_cast<double>(torso.body.warp),
-                              static_cast<double>(torso.landmarks), torso.landmark_noise_mm})};
+    return {key_text(
+        "analytic",
+        {torso.body.width_scale, torso.body.depth_scale, torso.body.belly_mm, made.noise_mm,
+         made.strength, static_cast<double>(made.points), made.mesh ? 1.0 : 0.0,
+         made.front_only ? 1.0 : 0.0, static_cast<double>(made.seed),
+         static_cast<double>(torso.body.warp), static_cast<double>(torso.body.neck_seed),
+         static_cast<double>(torso.landmarks), torso.landmark_noise_mm})};
 }
 
 }  // namespace

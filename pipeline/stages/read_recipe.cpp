@@ -100,6 +100,12 @@ void read_analytic(const TomlTable& table, RecipeInputs& inputs) {
     // The named body comes first: the proportions beside it change it.
     std::string body;
     if (table.text("body", body, analytic_body_names())) torso.body = *analytic_body(body);
+    int neck_seed = 0;
+    if (table.whole("neck_seed", neck_seed, 1, 1e6)) {
+        if (torso.body.neck_seed == 0)
+            table.add_fault("neck_seed", "without a neck", "body = \"neck\" beside it");
+        torso.body.neck_seed = neck_seed;
+    }
     table.number("width_scale", torso.body.width_scale, 0.7, 1.4);
     table.number("depth_scale", torso.body.depth_scale, 0.7, 1.4);
     table.number("belly_mm", torso.body.belly_mm, 0, 40);

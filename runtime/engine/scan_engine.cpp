@@ -220,6 +220,7 @@ FrameStatus ScanEngine::frame(double now_s,
         force_watch_.taken();
         input.settings.press_mm = sensed_press_mm_;
     }
+    if (procedure_.given()) input.change = procedure_.scene();  // what the frame before left
     renderer_.press_probe(input);
     record.press = renderer_.press();
     if (tools.has_needle) {

@@ -250,6 +250,7 @@ void Renderer::press_probe(const FrameInput& input) {
     if (!valid_pose(input.mannequin_from_probe)) return;
     m.shown_pose = input.mannequin_from_probe;
     if (!m.probe) return;
+    m.probe->set_venous_pressure(input.change.venous_pressure_mmhg);
     m.shown_pose = m.probe->at(input.mannequin_from_probe, input.settings.press_mm);
     m.press = m.probe->report();
 }

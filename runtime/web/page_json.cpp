@@ -100,16 +100,20 @@ std::string procedure_json(const PagePlayer& player) {
         part["mm"] = one.mm;
         taken.push_back(std::move(part));
     }
-    out["question"] = nullptr;
-    if (view.question >= 0) {
-        const ProcedureItem& item = p.items[static_cast<std::size_t>(view.question)];
+    const ProcedureState& s = view.state;
+    Json questions = Json::array();
+    for (std::size_t i = 0; view.question >= 0 && i < p.items.size(); ++i) {
+        const ProcedureItem& item = p.items[i];
+        const bool asked =
+            item.from_step < 0 || s.steps[static_cast<std::size_t>(item.from_step)].performed;
+        if (item.rule != ItemRule::asked || !asked || s.items[i].held) continue;
         Json question = Json::object();
-        question["item"] = view.question;
+        question["item"] = i;
         question["words"] = item.question;
         question["options"] = item.options;
-        out["question"] = std::move(question);
+        questions.push_back(std::move(question));
     }
-    const ProcedureState& s = view.state;
+    out["questions"] = std::move(questions);
     out["steps"] = std::move(steps);
     out["present"] = view.present_step;
     out["tray"] = std::move(tray);

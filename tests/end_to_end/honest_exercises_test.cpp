@@ -171,5 +171,15 @@ TEST(HonestExercises, ExpertsPassTheProceduresInThePlayer) {
     }
 }
 
+TEST(HonestExercises, TheExpertPassesTheCentralLineInThePlayerAndTheNeckIsChecked) {
+    const testing::TemporaryFolder folder;
+    const std::string path = cooked(
+        folder, std::string(SONOCASE_SOURCE) + "/scenarios/neck --set resample.voxel_mm=1.5");
+    testing::expect_expert_ticks_all(path, "central-line");
+    const auto check = testing::run_command(std::string(SONOCASE_BIN) + "/sonocase check " + path +
+                                            " -o " + (folder / "check.html"));
+    EXPECT_EQ(check.status, 0) << check.out << check.error;
+}
+
 }  // namespace
 }  // namespace sonocase

@@ -247,6 +247,11 @@ TEST_F(PressingExercises, TheExpertOfTheFemoralLineTicksAll) {
     sonocase::testing::expect_expert_ticks_all(open_->path, "femoral-line");
 }
 
+// Two segments of each groin: the right ones close, the left ones do not.
+TEST_F(PressingExercises, TheExpertOfTheSegmentsTicksAll) {
+    sonocase::testing::expect_expert_ticks_all(open_->path, "dvt-by-segment");
+}
+
 // What a recording says of tissue and needle.
 std::vector<std::string> tissue_events(const std::string& path) {
     const auto sequence = load_sequence(path);

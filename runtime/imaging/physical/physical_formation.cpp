@@ -132,6 +132,8 @@ class PhysicalFormation final : public ImageFormation {
                                      : 60.0;
         frame.motion = motion_at(exercise_.breathing, exercise_.pulsation,
                                  std::isfinite(input.time_s) ? input.time_s : 0);
+        frame.motion.vein_mm =
+            std::isfinite(input.change.vein_wall_mm) ? input.change.vein_wall_mm : 0;
         frame.effects = shown_;
         frame.press = shown_.deformation ? request.press : nullptr;
         if (scene_.wire >= 0) {  // the exercise has a procedure

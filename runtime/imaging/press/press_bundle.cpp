@@ -117,22 +117,29 @@ PressBundle::PressBundle(const CaseView& view, const PressBundleOptions& options
     for (std::size_t n = 0; n < bundle.labels.size(); ++n) {
         const Tissue& tissue = bundle.tissues[tissue_of[n]];
         const TissueMechanics m = mechanics_of(tissue, bundle.labels[n].name);
-        const double scale = m.drains ? options.venous_pressure_mmhg / kTableVenousPressureMmhg : 1;
         PressTissue out;
-        out.stiffness_kpa = static_cast<float>(
-            std::clamp(scale * m.stiffness_kpa, kMinStiffnessKpa, kMaxStiffnessKpa));
+        table_kpa_.push_back(m.stiffness_kpa);
         out.outside = tissue.kind == TissueKind::outside;
         out.drains = m.drains;
         out.rigid = m.rigid;
         out.membrane = tissue.name == "skin";
         tissues_.push_back(out);
     }
+    set_venous_pressure(options.venous_pressure_mmhg);
     const BrickVolume<std::uint8_t>& labels = bundle.label_bricks;
     uniform_.assign(labels.uniform.begin(), labels.uniform.end());
     uniform_.resize(uniform_.size() + 1);
     bricks_ = {reinterpret_cast<const std::int32_t*>(labels.table.data()), uniform_.data(),
                reinterpret_cast<const std::int32_t*>(labels.pool.data()), labels.size,
                brick_count(labels.size)};
+}
+
+void PressBundle::set_venous_pressure(double mmhg) {
+    for (std::size_t n = 0; n < tissues_.size(); ++n) {
+        const double scale = tissues_[n].drains ? mmhg / kTableVenousPressureMmhg : 1;
+        tissues_[n].stiffness_kpa = static_cast<float>(
+            std::clamp(scale * table_kpa_[n], kMinStiffnessKpa, kMaxStiffnessKpa));
+    }
 }
 
 std::uint8_t PressBundle::label(Point3 mannequin) const {

@@ -48,6 +48,9 @@ class PressBundle {
     // The bundle must outlive this object. Allocates; made when a scene is opened.
     explicit PressBundle(const CaseView& bundle, const PressBundleOptions& options = {});
 
+    // Another pressure in the veins, > 0; scenes made afterwards have it.
+    void set_venous_pressure(double mmhg);
+
     // The body under a probe at this pose; a finite rigid motion. The scene refers to this object
     // and is good until the next call. Beyond the volume its border goes on.
     PressScene scene(const Rigid& mannequin_from_probe);
@@ -68,6 +71,7 @@ class PressBundle {
 
     CaseView bundle_;
     std::vector<PressTissue> tissues_;
+    std::vector<double> table_kpa_;  // # labels: at the table's pressure
     SimdTarget simd_;
     std::vector<std::int32_t> uniform_;  // labels of uniform bricks, as words
     BrickLines bricks_;

@@ -11,7 +11,16 @@ ProbePress::ProbePress(const CaseView& bundle, const Exercise& exercise, SimdTar
     : body_(bundle, {exercise.deformation.venous_pressure_mmhg, simd}),
       field_(press_face(exercise.probe)),
       simd_(simd) {
+    exercise_mmhg_ = venous_mmhg_ = exercise.deformation.venous_pressure_mmhg;
     options_.stiffness_scale = exercise.deformation.stiffness_scale;
+}
+
+void ProbePress::set_venous_pressure(double mmhg) {
+    if (!(mmhg > 0)) mmhg = exercise_mmhg_;
+    if (mmhg == venous_mmhg_) return;
+    venous_mmhg_ = mmhg;
+    body_.set_venous_pressure(mmhg);
+    solved_ = false;
 }
 
 void ProbePress::press(const Rigid& pose) {

@@ -26,6 +26,8 @@ class ProbePress {
     // Presses a face at the pose, press_mm deeper; a pose that stays is solved once. Returns the
     // pose at which bone holds the face, which is that of the picture.
     Rigid at(const Rigid& mannequin_from_probe, double press_mm);
+    // Another pressure in the veins for what follows; not above 0: the exercise's.
+    void set_venous_pressure(double mmhg);
     // A needle that moves tissue, in the frame of the pose that at() returned.
     void dent(const NeedleDent& needle) { field_.dent(needle); }
 
@@ -51,6 +53,7 @@ class ProbePress {
     PressOptions options_;
     Rigid pose_, from_mannequin_;
     bool solved_ = false;
+    double exercise_mmhg_ = 8, venous_mmhg_ = 8;
 };
 
 }  // namespace sonocase::runtime::press

@@ -54,6 +54,7 @@ struct TruthRenderer::Impl {
     NeedleSight sight;
     NeedleModel needle;
     TruthVoxels voxels;
+    bool vessels_move;                         // effect pulsation is on
     std::unique_ptr<press::ProbePress> probe;  // null: effect deformation is off
     std::unique_ptr<press::PressView> press_view;
     std::vector<std::int32_t> closed_label;
@@ -100,6 +101,7 @@ TruthRenderer::Impl::Impl(CaseView view,
       sight(&anatomy, e),
       needle(e.needle),
       voxels(*view, o.model == ImageModel::physical),
+      vessels_move(moves.pulsation),
       first_hard_mm(pixels.rays()) {
     const ImageModelInfo& info = o.model == ImageModel::physical ? kPhysicalModel : kPaperModel;
     if (!(needle.slab_mm > 0)) needle.slab_mm = info.needle_slab_mm(exercise);
@@ -113,6 +115,7 @@ TruthRenderer::Impl::Impl(CaseView view,
 void TruthRenderer::Impl::press(FrameInput& input, bool wants_entry) {
     pressed = nullptr;
     if (probe) {
+        probe->set_venous_pressure(input.change.venous_pressure_mmhg);
         input.mannequin_from_probe = probe->at(input.mannequin_from_probe, input.settings.press_mm);
         truth.press = probe->report();
         NeedleShape s;
@@ -301,6 +304,9 @@ const FrameTruth& TruthRenderer::render(const FrameInput& frame, const TruthPlan
     if (!m.truth.posed) return m.truth;
     m.press(input, !planes.skin_depth_mm.empty());
     m.lay_out_rows(input.mannequin_from_probe);
+    const double wall_mm = m.vessels_move ? input.change.vein_wall_mm : 0;
+    m.rows.vein_vx = static_cast<float>(wall_mm / m.bundle->grid.spacing_mm.x);
+    m.region_rows.vein_vx = m.rows.region_per_voxel * m.rows.vein_vx;
     m.planes_of(input, planes);
     m.facts(input);
     return m.truth;

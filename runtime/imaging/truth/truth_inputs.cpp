@@ -8,6 +8,7 @@
 
 #include "formats/volume/boundary_record.h"
 #include "formats/volume/brick_volume.h"
+#include "formats/volume/tissue.h"
 #include "runtime/imaging/physical/model/region_look_up.h"
 
 namespace sonocase::runtime {
@@ -74,7 +75,9 @@ TruthVoxels::TruthVoxels(const CaseBundle& bundle, bool physical)
     const std::vector<int> tissues = tissue_of_label(bundle);
     for (std::size_t i = 0; i < bundle.labels.size(); ++i) {
         const Tissue& tissue = bundle.tissues[tissues[i]];
-        swells_[i] = is_artery(bundle.labels[i].name);
+        swells_[i] = is_artery(bundle.labels[i].name)                     ? 1
+                     : mechanics_of(tissue, bundle.labels[i].name).drains ? 2
+                                                                          : 0;
         hard_[i] = physical ? tissue.kind == TissueKind::bone || tissue.kind == TissueKind::gas
                             : tissue.casts_shadow;
     }

@@ -161,6 +161,15 @@ HWY_INLINE I side_of_surface(D d, const TruthFrameRows& f, I record, I own, cons
         side = hn::Add(side, hn::IfThenElseZero(hn::RebindMask(d, swells), pulse));
         side = hn::Sub(side, hn::IfThenElseZero(hn::RebindMask(d, yields), pulse));
     }
+    if (f.vein_vx != 0) {
+        const auto wall = hn::Set(d, f.vein_vx);
+        const auto two = hn::Set(di, 2);
+        const auto inside = hn::Eq(hn::GatherIndex(di, f.swells, own), two);
+        const auto beside = hn::AndNot(
+            inside, hn::Eq(hn::GatherIndex(di, f.swells, hn::IfThenElseZero(near, second)), two));
+        side = hn::Add(side, hn::IfThenElseZero(hn::RebindMask(d, inside), wall));
+        side = hn::Sub(side, hn::IfThenElseZero(hn::RebindMask(d, beside), wall));
+    }
     const auto beyond = hn::And(near, hn::RebindMask(di, hn::Lt(side, hn::Zero(d))));
     return hn::IfThenElse(beyond, second, own);
 }

@@ -28,7 +28,8 @@ struct TruthFrameRows {
     std::int32_t bricks_x, bricks_xy;
     std::int32_t label_count;
     float pulse_vx = 0;          // outward shift of arterial walls
-    const std::int32_t* swells;  // # labels: 1 for arteries
+    float vein_vx = 0;           // of the walls of veins
+    const std::int32_t* swells;  // # labels: 1 for arteries, 2 for veins
     const std::int32_t* hard;    // # labels: 1 for what casts a shadow
 
     // The fine region, with its own size, words and pulse; null: none. Its box, and its voxel

@@ -150,10 +150,15 @@ Standing standing(std::span<const ProgressEntry> entries,
         if (entry.case_name != case_name || entry.exercise != exercise) continue;
         ++result.attempts;
         result.passes += entry.passed;
-        if (!entry.passed)
+        constexpr double kSkilled = 0.1, kUnskilled = 0.3;  // shares of failures
+        if (!entry.passed) {
             result.in_a_row = 0;
-        else if (attempt_difficulty(entry.seed) >= 0)
+            result.cusum = std::max(0.0, result.cusum + std::log(kSkilled / kUnskilled));
+        } else if (attempt_difficulty(entry.seed) >= 0) {
             ++result.in_a_row;
+            result.cusum += std::log((1 - kSkilled) / (1 - kUnskilled));
+        }
+        result.steady = result.steady || result.cusum >= kSteadyCusum;
         result.mastered = result.mastered || result.in_a_row >= std::max(mastery, 1);
         const double mm = metric_of(entry, "final_tip_to_target_mm");
         if (std::isfinite(mm) && (result.best_mm < 0 || mm < result.best_mm)) result.best_mm = mm;

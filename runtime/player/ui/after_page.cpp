@@ -216,8 +216,13 @@ std::string advice_words(const SessionView& session) {
         standing(session.progress.history, loaded.name(), loaded.exercise().name, mastery);
     if (!result.has_marks)
         return tr("This exercise has no pass marks: compare the measures with your own.");
-    if (now.in_a_row >= mastery)
-        return tr("Mastered. Go on to the next exercise, or try it as an exam.");
+    if (now.in_a_row >= mastery) {
+        if (now.steady)
+            return tr(
+                "Mastered, and steady by CUSUM. Go on to the next exercise, or try it as an exam.");
+        return filled(tr("Mastered. Go on, or stay until you are steady: CUSUM %.1f of %.1f."),
+                      now.cusum, kSteadyCusum);
+    }
     if (attempt_difficulty(loaded.attempt_seed) < 0)
         return tr(
             "Well done. This was an easier attempt; the next is harder, and attempts as hard "

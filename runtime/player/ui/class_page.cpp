@@ -22,6 +22,7 @@ void draw_cell(Ui& ui, const Box& box, const Standing& now) {
                             : now.passes > 0  ? colour::kGood
                                               : colour::kBad;
     const char* words = now.attempts == 0 ? "Not tried"
+                        : now.steady      ? "Steady"
                         : now.mastered    ? "Mastered"
                         : now.passes > 0  ? "Passed"
                                           : "Not yet";

@@ -40,6 +40,7 @@ export class ScanPage {
         this.measures = [];
         this.frozen = false;
         this.frames = 0;
+        this.put_off = -1;  // the question that was put off last
         this.make_sliders();
         this.listen();
         this.hands = new Hands(this, $('picture'));
@@ -232,11 +233,14 @@ export class ScanPage {
         $('procedure').hidden = !state;
         if (!state) {
             this.procedure_said = '';
+            this.put_off = -1;
             return;
         }
         $('hands-words').textContent = hands_words(state);
-        const {steps, present, question, tray} = state;
-        const said = JSON.stringify([steps, present, question, tray, this.exam()]);
+        // Those that wait for an answer; one that was put off comes back with the next answer.
+        const {steps, present, questions, tray} = state;
+        const question = questions.find((one) => one.item > this.put_off);
+        const said = JSON.stringify([steps, present, questions, this.put_off, tray, this.exam()]);
         if (said === this.procedure_said) return;
         this.procedure_said = said;
         const kMark = {done: '✓', too_early: '!', too_late: '!', missed: '!'};
@@ -248,18 +252,26 @@ export class ScanPage {
             return line;
         }));
         $('step-words').textContent = steps[present]?.instruction ?? (steps.length ? 'All steps are behind you: finish the attempt.' : '');
-        $('question').hidden = !question;
-        $('question-words').textContent = question?.words ?? '';
+        $('question').hidden = !questions.length;
+        $('question-words').textContent = question?.words ?? 'A question waits.';
         const button = (words, act) => {
             const one = element('button', words, {type: 'button'});
             one.addEventListener('click', () => this.perform(act));
             return one;
         };
-        $('options').replaceChildren(...(question?.options ?? []).map((words, n) => button(words, {kind: kAnswer, index: question.item, amount: n})));
+        const choice = (words, put_off, title) => {
+            const one = element('button', words, {type: 'button', title});
+            one.addEventListener('click', () => { this.put_off = put_off; this.say_procedure(true); });
+            return one;
+        };
+        $('options').replaceChildren(
+            ...(question?.options ?? []).map((words, n) => button(words, {kind: kAnswer, index: question.item, amount: n})),
+            question ? choice('Later', question.item, 'It is asked again when the next question is answered') : choice('Show it', -1, ''));
         $('tray').replaceChildren(...tray.map((act) => button(act.words, act)));
         this.tray = tray;
     }
     perform(act) {
+        if (act.kind === kAnswer) this.put_off = -1;
         if (!this.core.act(act)) this.notice('Too many acts at once: wait a moment.');
         this.touched();
     }

@@ -206,6 +206,42 @@ TEST(PressedFrame, TheVeinClosesAndTheArteryStaysRound) {
     }
 }
 
+// A vein that is fuller, or emptier: both renderers move its walls, pressed or not.
+TEST(PressedFrame, WallsOfVeinsMoveInBothRenderers) {
+    const RenderOptions fast = block_picture(ImageModel::physical),
+                        slow = block_picture(ImageModel::physical, 96, RendererKind::reference);
+    for (const double mm : {-1.0, 5.0}) {
+        FrameInput input = pressed_input(mm);
+        const auto at_rest = draw(block_exercise(), fast, input, pressed_block());
+        for (const double wall_mm : {-0.65, 0.9}) {
+            input.change.vein_wall_mm = wall_mm;
+            const auto moved = draw(block_exercise(), fast, input, pressed_block());
+            const Difference d =
+                compare(moved, draw(block_exercise(), slow, input, pressed_block()));
+            EXPECT_LT(d.mean, 0.5) << mm << " " << wall_mm;  // as above
+            EXPECT_GT(compare(moved, at_rest).mean, 0.3) << mm << " " << wall_mm;
+        }
+    }
+}
+
+TEST(PressedFrame, AHigherPressureInTheVeinKeepsItOpen) {
+    auto renderer = Renderer::create(pressed_block(), block_exercise(), field_picture());
+    ASSERT_TRUE(renderer.has_value());
+    const auto open_at = [&](double mmhg) {
+        FrameInput input = pressed_input(8);
+        input.change.venous_pressure_mmhg = mmhg;
+        renderer->press_probe(input);
+        return renderer->press().vein_open;
+    };
+    const double as_written = open_at(0);
+    EXPECT_EQ(open_at(8), as_written);  // that of the exercise
+    // The face is as deep as before, and the tissue above yields as well: a vein of three times the
+    // stiffness gives way by a tenth less.
+    EXPECT_LT(open_at(4), as_written - 0.01);
+    EXPECT_GT(open_at(24), as_written + 0.03);
+    EXPECT_EQ(open_at(0), as_written);
+}
+
 // Speckle belongs to the tissue: the pressed picture, pulled back, is the one at rest, less what
 // the point spread blurs in another direction.
 TEST(PressedFrame, SpeckleMovesWithTheTissue) {

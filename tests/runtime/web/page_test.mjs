@@ -352,6 +352,11 @@ await run_tests({
         await page.until('!document.getElementById("question").hidden');
         expect_equal(await page.value('document.querySelectorAll("#steps li").length'), 5, 'steps');
         expect((await text('question-words')).includes('INR'), 'the question');
+        const press = (words) => page.value(`[...document.querySelectorAll("#options button")].find((one) => one.textContent === "${words}").click()`);
+        await press('Later');
+        expect_equal(await text('question-words'), 'A question waits.', 'put off');
+        await press('Show it');
+        expect((await text('question-words')).includes('INR'), 'the question again');
         await page.value('document.querySelectorAll("#options button")[1].click()');
         await page.until('document.getElementById("question").hidden');
         await page.value('document.querySelector("#tray button").click()');

@@ -179,6 +179,17 @@ HWY_NOINLINE void surface_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
             distance = hn::Add(distance, hn::Sub(hn::IfThenElseZero(swells, pulse),
                                                  hn::IfThenElseZero(yields, pulse)));
         }
+        if (b.vein_mm != 0) {
+            const auto wall = hn::Set(d, b.vein_mm);
+            const auto one = hn::Set(di, 1);
+            const auto inside = hn::Eq(hn::GatherIndex(di, b.is_vein, own), one);
+            const auto beside = hn::AndNot(
+                inside,
+                hn::Eq(hn::GatherIndex(di, b.is_vein, hn::IfThenElseZero(near, second)), one));
+            distance =
+                hn::Add(distance, hn::Sub(hn::IfThenElseZero(hn::RebindMask(d, inside), wall),
+                                          hn::IfThenElseZero(hn::RebindMask(d, beside), wall)));
+        }
         const auto beyond = hn::And(near, hn::RebindMask(di, hn::Lt(distance, zero)));
         hn::Store(hn::IfThenElse(beyond, second, own), di, c.label.row(row));
 

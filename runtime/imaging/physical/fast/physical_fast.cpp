@@ -435,6 +435,8 @@ void PhysicalFast::set_poses(const PhysicalFrame& f, PhysicalBlock& b) const {
     b.looks_at = looks_drawn_.data();
     b.look_stride = look_stride_;
     b.pulse_mm = f.effects.pulsation ? static_cast<float>(f.motion.pulse_mm) : 0;
+    b.vein_mm = f.effects.pulsation ? static_cast<float>(f.motion.vein_mm) : 0;
+    b.is_vein = scene_.is_vein.data();
 }
 
 // Fills in what the kernels look up: volumes, textures, tissues, targets.
@@ -602,7 +604,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
     if (clutter) mirror_rows(clutter_, kMaxHazeReach);
     met_.pressed = f.press != nullptr;
     met_.breathes = f.motion.breathes();
-    met_.pulses = f.motion.pulse_mm != 0;
+    met_.pulses = f.motion.pulse_mm != 0 || f.motion.vein_mm != 0;
     met_.has_echo = scene_.words.has_echo();
     met_.interface = met.interfaces;
     met_.refraction = met.refraction;

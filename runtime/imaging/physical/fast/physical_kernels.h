@@ -122,6 +122,8 @@ struct PhysicalBlock {
     const float* breathing = nullptr;  // weight at nodes, `lines` apart; null: nothing moves
     float shift_voxel[3] = {0, 0, 0};
     float pulse_mm = 0;
+    float vein_mm = 0;                      // outward shift of the walls of veins
+    const std::int32_t* is_vein = nullptr;  // # labels: 1 for veins
 
     // Effect deformation; null: nothing is pressed.
     const press::PressView* press_view = nullptr;

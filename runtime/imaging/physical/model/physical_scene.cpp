@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "formats/pathology/pathology_kinds.h"
+#include "formats/volume/tissue.h"
 #include "runtime/imaging/physical/model/physical_model.h"
 #include "runtime/imaging/physical/model/streak_plates.h"
 #include "runtime/imaging/physical/model/wall_sheets.h"
@@ -223,7 +224,9 @@ void add_tissues(const CaseBundle& bundle,
         std::any_of(s.acoustics.begin(), s.acoustics.end(), [](const AcousticProperties& l) {
             return l.kind == TissueKind::bone || l.kind == TissueKind::gas;
         });
+    s.is_vein.assign(256, 0);
     for (std::size_t l = 0; l < count; ++l) {
+        s.is_vein[l] = mechanics_of(tissue(l), bundle.labels[l].name).drains ? 1 : 0;
         s.is_lung.push_back(tissue(l).name == "lung");
         s.has_gas = s.has_gas || s.acoustics[l].kind == TissueKind::gas;
     }

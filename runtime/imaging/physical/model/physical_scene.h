@@ -73,6 +73,7 @@ struct PhysicalScene {
     BrickTable words;
     RegionLookUp region;                        // on smaller voxels; complete from the start
     std::vector<AcousticProperties> acoustics;  // # labels, then one per target
+    std::vector<std::int32_t> is_vein;          // 256: 1 for draining lumens
     std::vector<std::int32_t> closed_label;     // 256: label that is shown of a collapsed lumen
     std::vector<PairEcho> pairs;                // # labels^2, [own * # labels + second]
     std::vector<bool> is_lung;                  // # labels

@@ -109,6 +109,10 @@ Place place_at(const PhysicalScene& s, const PhysicalFrame& f, Point3 v, Point3 
         std::max(plane_mm, min_mm) + s.roughness_mm * p.rough.shift * (p.own < p.second ? 1 : -1);
     const PairEcho& pair = s.pairs[p.own * s.labels() + p.second];
     p.distance_mm += pair.pulse * f.motion.pulse_mm;
+    if (f.motion.vein_mm != 0 && f.effects.pulsation) {
+        const int vein = s.is_vein[p.own] != 0 ? 1 : s.is_vein[p.second] != 0 ? -1 : 0;
+        p.distance_mm += vein * f.motion.vein_mm;
+    }
     if (p.distance_mm < 0) p.label = p.second;
     return p;
 }

@@ -11,6 +11,7 @@
 
 #include "formats/files/load_save.h"
 #include "formats/scoring/anatomy.h"
+#include "pressed_block.h"
 #include "support/temporary_folder.h"
 #include "truth_support.h"
 
@@ -183,6 +184,31 @@ TEST(Truth, EveryInstructionSetAndAStreamedBundleGiveTheSameBytes) {
             if (!first) first = planes;
             EXPECT_TRUE(planes == *first) << simd << streamed;
         }
+    }
+}
+
+// A vein whose walls have moved counts as many pixels as its radius says; the artery stays.
+TEST(Truth, WallsOfVeinsMoveWithTheirFilling) {
+    using sonocase::testing::PressedBlock;
+    const PressedBlock shape;
+    const Exercise exercise = sonocase::testing::block_exercise();
+    const RenderOptions options = picture(300, 300);
+    auto truth = truth_of(sonocase::testing::pressed_block(), exercise, options);
+    Planes planes(options);
+    const auto pixels = [&](double wall_mm, int label) {
+        FrameInput input;
+        input.mannequin_from_probe = sonocase::testing::pressed_by(-1);
+        input.change.vein_wall_mm = wall_mm;
+        return static_cast<double>(
+            truth.render(input, planes.spans()).pixels_of_label[static_cast<std::size_t>(label)]);
+    };
+    const double vein = pixels(0, PressedBlock::vein_label),
+                 artery = pixels(0, PressedBlock::artery_label);
+    ASSERT_GT(vein, 500);
+    for (const double wall_mm : {-0.65, 0.9}) {
+        const double wider = 1 + wall_mm / shape.vein_radius_mm;
+        EXPECT_NEAR(pixels(wall_mm, PressedBlock::vein_label) / vein, wider * wider, 0.02);
+        EXPECT_EQ(pixels(wall_mm, PressedBlock::artery_label), artery);
     }
 }
 

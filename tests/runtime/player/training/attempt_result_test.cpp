@@ -150,5 +150,28 @@ TEST(Standing, PassesOfEasierAttemptsDoNotCountTowardsMastery) {
     EXPECT_TRUE(standing(entries, "torso", "liver", 3).mastered);
 }
 
+// Eight passes in a row, or more with failures between; a lucky three are not enough.
+TEST(Standing, IsSteadyByCusumLaterThanByPassesInARow) {
+    std::vector<ProgressEntry> entries(7, attempt(true, 2));
+    EXPECT_TRUE(standing(entries, "torso", "liver", 3).mastered);
+    EXPECT_FALSE(standing(entries, "torso", "liver", 3).steady);
+    EXPECT_NEAR(standing(entries, "torso", "liver", 3).cusum, 7 * std::log(0.9 / 0.7), 1e-12);
+    entries.push_back(attempt(false, 9));  // takes back four passes and a half
+    EXPECT_NEAR(standing(entries, "torso", "liver", 3).cusum,
+                7 * std::log(0.9 / 0.7) + std::log(0.1 / 0.3), 1e-12);
+    entries.insert(entries.end(), 5, attempt(true, 2));
+    EXPECT_FALSE(standing(entries, "torso", "liver", 3).steady);
+    entries.push_back(attempt(true, 2));
+    EXPECT_TRUE(standing(entries, "torso", "liver", 3).steady);
+    // It never falls below 0: a bad beginning is forgiven.
+    entries.assign(20, attempt(false, 9));
+    EXPECT_EQ(standing(entries, "torso", "liver", 3).cusum, 0);
+    for (ProgressEntry& entry : entries) {
+        entry.passed = true;
+        entry.seed = seed_with_difficulty(9, -1);
+    }
+    EXPECT_EQ(standing(entries, "torso", "liver", 3).cusum, 0);  // easier ones do not count
+}
+
 }  // namespace
 }  // namespace sonocase::runtime
