@@ -201,11 +201,10 @@ struct Step {
     const char* words;
     std::array<std::uint8_t, 3> colour;
 };
-constexpr Step kSteps[] = {{2, "within 2 mm", {255, 245, 200}},
-                           {5, "2 to 5 mm", {253, 204, 110}},
-                           {10, "5 to 10 mm", {244, 140, 60}},
-                           {20, "10 to 20 mm", {205, 60, 35}},
-                           {1e9, "more than 20 mm", {120, 10, 45}}};
+constexpr Step kSteps[] = {
+    {2, "within 2 mm", {255, 245, 200}}, {5, "2 to 5 mm", {253, 204, 110}},
+    {10, "5 to 10 mm", {244, 140, 60}},  {20, "10 to 20 mm", {205, 60, 35}},
+    {40, "20 to 40 mm", {150, 25, 45}},  {1e9, "more than 40 mm", {80, 0, 45}}};
 
 const Step& step_of(double mm) {
     return *std::find_if(std::begin(kSteps), std::end(kSteps),

@@ -17,6 +17,10 @@ constexpr std::size_t kPointsOfAnOrgan = 25;
 constexpr double kBlockMm = 60;
 // The head's direction is pointed at by hand, to some 8 degrees (root mean square, both axes).
 constexpr double kUpError = 0.1;
+// Slopes that differ from the quadratic's are about three times as steep as those expected of it.
+constexpr double kFarther = 3;
+// The excess of the design effect at which a quadratic and another body are as likely.
+constexpr double kHalfSure = 1;
 
 // Where structures lie: ct, relative to the skin's origin.
 struct Places {
@@ -203,25 +207,21 @@ double displaced_mm(const FitContext& s,
     return std::sqrt(sum / static_cast<double>(points.size()));
 }
 
-Spread spread_of_draws(const Places& place,
-                       const RigidQuadratic& q,
-                       const QuadraticTrust& trust,
-                       double displaced) {
-    std::vector<double> off;
+// Of maps drawn from the posterior, root mean square over draws and points.
+double spread_of_draws(const Places& place, const RigidQuadratic& q, const QuadraticTrust& trust) {
+    double sum = 0;
     for (RigidQuadratic draw : trust.draws) {
         for (int d = 0; d < 3; ++d) {
             for (int c = 0; c < 10; ++c) draw.k[d][c] -= q.k[d][c];
         }
         const double moved = apart(
             place, [&](Point3 p) { return map_point(draw, p); }, [](Point3) { return Point3{}; });
-        off.push_back(std::hypot(moved, displaced));
+        sum += moved * moved;
     }
-    if (off.empty()) return {};
-    std::sort(off.begin(), off.end());
-    return {off[off.size() / 2], off[off.size() * 90 / 100], off[off.size() * 95 / 100]};
+    return trust.draws.empty() ? 0 : std::sqrt(sum / static_cast<double>(trust.draws.size()));
 }
 
-Spread spread_of_refits(const FitContext& s,
+double spread_of_refits(const FitContext& s,
                         const Places& place,
                         const Registration& map,
                         const std::vector<Registration>& others) {
@@ -233,7 +233,10 @@ Spread spread_of_refits(const FitContext& s,
         const double off = apart(place, through(other), through(map));
         sum += off * off;
     }
-    const double rms = others.empty() ? 0 : std::sqrt(sum / static_cast<double>(others.size()));
+    return others.empty() ? 0 : std::sqrt(sum / static_cast<double>(others.size()));
+}
+
+Spread quantiles(double rms) {
     return {kMedianOfRms * rms, kP90OfRms * rms, kP95OfRms * rms};
 }
 
@@ -264,38 +267,10 @@ double landmark_weight(const QuadraticTrust& trust, double landmark_mm) {
     return std::clamp(ratio * ratio, 1e-5, 0.02);
 }
 
-namespace {
-
-// A skin that differs says that the whole body does, or that its fat does: organs that follow the
-// skin and organs that stay where a rigid motion puts them are as likely. What the map does beyond
-// a rigid motion is therefore left open, beside the spread of a model that is taken for true. The
-// factors lie above those that halves of sixty known maps ask for (1.3 to 1.7), since maps of other
-// builds ask for more (tests/pipeline/registration/fit_unknown_test.cpp, docs/numerics.md).
-constexpr double kP90Factor = 1.8, kP95Factor = 2.4, kMedianOfModel = 0.5;
-
-Spread with_model(const Spread& fit, double beyond_rigid_mm) {
-    return {std::hypot(fit.median_mm, kMedianOfModel * beyond_rigid_mm),
-            std::hypot(kP90Factor * fit.p90_mm, beyond_rigid_mm),
-            std::hypot(kP95Factor * fit.p95_mm, kP95OfRms / kP90OfRms * beyond_rigid_mm)};
+double beyond_quadratic(const QuadraticTrust& trust) {
+    const double excess = std::max(0.0, trust.design_effect - 1);
+    return std::sqrt(1 + kFarther * kFarther * excess / (excess + kHalfSure));
 }
-
-// The rigid motion that lies in the map's inside: mean rotation, and the centroid's.
-Rigid rigid_part(const FitContext& s, const Registration& map) {
-    Vector3 column[3], from, to;
-    for (Point3 p : s.inside) {
-        const Point3 ct = s.fine.origin + (p - Point3{});
-        const Matrix3 j = jacobian(map, ct);
-        for (int a = 0; a < 3; ++a) column[a] = column[a] + j.column(a);
-        from = from + (ct - Point3{});
-        to = to + (mannequin_from_ct(map, ct) - Point3{});
-    }
-    const double share = 1 / static_cast<double>(s.inside.size());
-    const Matrix3 turn = nearest_rotation(
-        Matrix3::from_columns(share * column[0], share * column[1], share * column[2]));
-    return {turn, share * to - turn * (share * from)};
-}
-
-}  // namespace
 
 void find_unknown(const FitContext& s,
                   const Rigid& rigid,
@@ -304,39 +279,38 @@ void find_unknown(const FitContext& s,
                   const Progress& progress,
                   WarpFit* w) {
     report_progress(progress, 0.9, "what the readings leave open");
-    w->displaced_mm = displaced_mm(s, w->registration, s.inside);
+    const double displaced_inside = displaced_mm(s, w->registration, s.inside);
+    const auto inside = [&](const QuadraticTrust& trust) {
+        return std::hypot(beyond_quadratic(trust) * trust.inside_mm, displaced_inside);
+    };
+    w->inside_mm = inside(w->trust);
     QuadraticTrust held;
     if (s.landmarks.empty() && !options.paper_warp) {
         held = trust_with_landmarks(s, judged, options, *w);
-        w->with_landmarks_mm = held.inside_mm;
+        if (held.inside_mm > 0) w->with_landmarks_mm = inside(held);
     }
     if (!s.labels || w->trust.draws.empty() || s.inside.empty()) return;
     std::vector<Registration> others;
     if (options.uncertainty == "on") others = refits(s, rigid, options, *w);
-    const Rigid rigid_motion = rigid_part(s, w->registration);
-    const auto ct = [&](Point3 p) { return s.fine.origin + (p - Point3{}); };
     for (const Places& place : places_of(s)) {
-        const double beyond = apart(
-            place, [&](Point3 p) { return mannequin_from_ct(w->registration, ct(p)); },
-            [&](Point3 p) { return rigid_motion * ct(p); });
         const double displaced = displaced_mm(s, w->registration, place.points);
+        const auto said = [&](const QuadraticTrust& trust) {
+            const double spread = beyond_quadratic(trust) * spread_of_draws(place, judged, trust);
+            return quantiles(std::hypot(spread, displaced));
+        };
         OrganUnknown unknown;
         unknown.label = place.label;
-        unknown.beyond_rigid_mm = beyond;
-        unknown.covariance =
-            with_model(spread_of_draws(place, judged, w->trust, displaced), beyond);
+        unknown.covariance = said(w->trust);
         if (!others.empty()) {
-            const Spread halves = spread_of_refits(s, place, w->registration, others);
-            unknown.halves_p90_mm = halves.p90_mm;
-            unknown.refits = with_model(halves, beyond);
+            const double halves = spread_of_refits(s, place, w->registration, others);
+            unknown.halves_p90_mm = kP90OfRms * halves;
+            unknown.refits = quantiles(std::hypot(halves, displaced));
         }
         const Spread &a = unknown.covariance, &b = unknown.refits;
         unknown.median_mm = std::max(a.median_mm, b.median_mm);
         unknown.p90_mm = std::max(a.p90_mm, b.p90_mm);
         unknown.p95_mm = std::max(a.p95_mm, b.p95_mm);
-        if (!held.draws.empty())
-            unknown.p90_with_landmarks_mm =
-                with_model(spread_of_draws(place, judged, held, displaced), beyond).p90_mm;
+        if (!held.draws.empty()) unknown.p90_with_landmarks_mm = said(held).p90_mm;
         w->unknown.push_back(std::move(unknown));
     }
 }

@@ -22,6 +22,9 @@ constexpr double kMirrorScore = 1.06;
 // Torsos without a waist, read all round, fit upside down 5 % better to 5 % worse: neither is told
 // then. Where half of the skin or more was not read they fit up to 14 % better.
 constexpr double kOppositeScore = 1.06, kOppositeScoreOfPart = 1.2, kWholeCoverage = 0.65;
+// A pose that reaches less than this share of the readings that another reaches has slid off them,
+// where gaps cost no more than the missing counterparts and a hint is off.
+constexpr double kSlidOff = 0.5;
 constexpr int kFewerStarts = 3;   // the head the other way is looked for with a third of the starts
 constexpr int kMoreSearches = 2;  // with twice the starts each, while only one start found the best
 
@@ -109,18 +112,19 @@ JudgedPose judge(const FitContext& s,
 }
 
 std::vector<JudgedPose> judge_candidates(const FitContext& s,
+                                         const TargetSurface& target,
                                          const Given& given,
                                          const SplinePenalty& field,
                                          RigidOptions rigid,
                                          const Progress& progress) {
     rigid.hints = given.hints;
     const std::vector<RigidCandidate> candidates =
-        align_rigid_candidates(s.coarse, s.target, rigid, progress);
+        align_rigid_candidates(s.coarse, target, rigid, progress);
     report_progress(progress, 0.2, "rigid alignment: judging candidates");
     std::vector<JudgedPose> judged(candidates.size());
     parallel_for(candidates.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t n = begin; n < end; ++n)
-            judged[n] = judge(s, s.target, given, field, candidates[n]);
+            judged[n] = judge(s, target, given, field, candidates[n]);
     });
     return judged;
 }
@@ -237,6 +241,17 @@ Given mirrored(Given given, const Mirror& mirror) {
     return given;
 }
 
+// Best first; those that have slid off the readings last.
+void rank(std::vector<JudgedPose>& judged) {
+    double most = 0;
+    for (const JudgedPose& p : judged) most = std::max(most, p.coverage);
+    std::stable_sort(
+        judged.begin(), judged.end(), [most](const JudgedPose& a, const JudgedPose& b) {
+            const bool a_off = a.coverage < kSlidOff * most, b_off = b.coverage < kSlidOff * most;
+            return a_off == b_off ? a.score_mm < b.score_mm : b_off;
+        });
+}
+
 // What the scores of a pose and of its opposite tell.
 enum class Verdict { right, wrong, untold };
 Verdict verdict_of(const JudgedPose& best, double opposite_mm) {
@@ -253,6 +268,7 @@ void check_hands(const FitContext& s,
                  const SplinePenalty& field,
                  const RigidOptions& options,
                  const std::vector<JudgedPose>& judged,
+                 const Progress& progress,
                  PoseChoice* choice) {
     const JudgedPose& best = choice->best;
     const Rigid& pose = best.rigid.target_from_skin;
@@ -262,7 +278,8 @@ void check_hands(const FitContext& s,
     RigidOptions rigid = options;
     rigid.hints = there.hints;
     // From the pose itself, and where that does not fit from the mirror images of the others: the
-    // right pose of a left-handed surface is seldom the one that it seems to have.
+    // right pose of a left-handed surface is seldom the one that it seems to have. Before the axes
+    // are called right, a search of the mirror image's own.
     double score = INFINITY;
     for (const JudgedPose& other : judged) {
         const Rigid& from = other.rigid.target_from_skin;
@@ -274,6 +291,10 @@ void check_hands(const FitContext& s,
             score,
             judge(s, target, there, field, refine_rigid(s.coarse, target, start, rigid)).score_mm);
         if (score < kMirrorScore * best.score_mm) break;
+    }
+    if (score >= kMirrorScore * best.score_mm) {
+        for (const JudgedPose& p : judge_candidates(s, target, there, field, rigid, progress))
+            score = std::min(score, p.score_mm);
     }
     choice->mirror_score_mm = score;
     const std::string scores =
@@ -302,7 +323,7 @@ void check_head(const FitContext& s,
     turned.hints.up = -*given.hints.up;
     rigid.starts = std::max(1, rigid.starts / kFewerStarts);
     double score = INFINITY;
-    for (const JudgedPose& p : judge_candidates(s, turned, field, rigid, progress))
+    for (const JudgedPose& p : judge_candidates(s, s.target, turned, field, rigid, progress))
         score = std::min(score, p.score_mm);
     choice->turned_score_mm = score;
     const double best = choice->best.score_mm;
@@ -379,11 +400,9 @@ PoseChoice choose_pose(const FitContext& s,
     PoseChoice choice;
     std::vector<JudgedPose> judged;
     for (int search = 0;; ++search) {
-        judged = judge_candidates(s, given, field, rigid, progress);
+        judged = judge_candidates(s, s.target, given, field, rigid, progress);
         choice.open_side_dropped = drop_open_side(s, options, judged);
-        std::stable_sort(
-            judged.begin(), judged.end(),
-            [](const JudgedPose& a, const JudgedPose& b) { return a.score_mm < b.score_mm; });
+        rank(judged);
         // A pose that one start alone has found may have a better one beside it that none has.
         if (judged[0].rigid.found > 1 || search == kMoreSearches) break;
         rigid.starts *= 2;
@@ -396,7 +415,7 @@ PoseChoice choose_pose(const FitContext& s,
     if (choice.open_side_dropped) given.hints.back.reset();
     rigid.starts = options.rigid.starts;
     check_head(s, given, field, rigid, progress, &choice);
-    check_hands(s, given, field, rigid, judged, &choice);
+    check_hands(s, given, field, rigid, judged, progress, &choice);
     check_front(s, given, field, rigid, &choice);
     return choice;
 }

@@ -181,11 +181,10 @@ StageReport warp_report(const FitContext& s,
     report.measures.push_back({"gap_standard_error_mm", w.trust.standard_error_mm});
     report.measures.push_back({"held_out_mm", w.trust.held_out_mm});
     report.measures.push_back({"rigid_held_out_mm", w.rigid_trust.fitted_mm});
-    report.measures.push_back(
-        {"predicted_interior_mm", std::hypot(w.trust.inside_mm, w.displaced_mm)});
+    report.measures.push_back({"gap_design_effect", w.trust.design_effect});
+    report.measures.push_back({"predicted_interior_mm", w.inside_mm});
     if (w.with_landmarks_mm > 0)
-        report.measures.push_back(
-            {"interior_with_two_landmarks_mm", std::hypot(w.with_landmarks_mm, w.displaced_mm)});
+        report.measures.push_back({"interior_with_two_landmarks_mm", w.with_landmarks_mm});
     report.measures.push_back({"residual_warp", w.residual.used ? 1.0 : 0.0});
     report.measures.push_back({"residual_bending", w.residual.used ? w.residual.bending : 0.0});
     report.measures.push_back({"residual_mean_mm", w.residual_mean_mm});

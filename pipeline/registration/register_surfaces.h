@@ -37,7 +37,7 @@
 
 namespace sonocase::pipeline::inline registration {
 
-inline constexpr int kRegisterVersion = 6;
+inline constexpr int kRegisterVersion = 7;
 
 // The same point of the body on both surfaces, e.g. navel or crotch.
 struct Landmark {
@@ -103,10 +103,9 @@ struct Spread {
 // the larger of the two.
 struct OrganUnknown : Spread {
     std::string label;
-    Spread covariance;           // of the Gauss-Newton system
-    Spread refits;               // to halves of the readings; zero: not asked for
-    double halves_p90_mm = 0;    // nine in ten of the refits carry it less far; 0: not asked for
-    double beyond_rigid_mm = 0;  // what the map does beyond a rigid motion of the inside
+    Spread covariance;         // of the Gauss-Newton system
+    Spread refits;             // to halves of the readings; zero: not asked for
+    double halves_p90_mm = 0;  // nine in ten of the refits carry it less far; 0: not asked for
     double p90_with_landmarks_mm = 0;  // if two landmarks were given; 0: some are
 };
 

@@ -39,8 +39,8 @@ struct WarpFit {
     OneToOneProof one_to_one;
     std::vector<OrganChange> organs;  // empty without labels
     std::vector<OrganUnknown> unknown;
-    double displaced_mm = 0;       // inside, by what follows the quadratic; root mean square
-    double with_landmarks_mm = 0;  // trust.inside_mm if two landmarks were given; 0: some are
+    double inside_mm = 0;          // expected error inside the body, whatever the true map; rms
+    double with_landmarks_mm = 0;  // the same if two landmarks were given; 0: some are
     FitMeasure rigid_fit, quadratic_fit, fit;
     double residual_mean_mm = 0;       // at the skin
     std::vector<RefineOptions> steps;  // of the quadratic, to the map that was chosen

@@ -355,6 +355,8 @@ int build_one(const BuildOptions& options) {
                              note.text.c_str());
         print_warnings("build", with_cache_notes(run));
     }
+    if (!achieved.missed.empty())
+        std::fprintf(stderr, "sonocase build: warning: %s\n", achieved.missed.c_str());
     const Grid& grid = cooked->bundle.grid;
     std::printf("%s  %.1f MB, %d x %d x %d voxels of %g mm, %zu labels, %.1f s\n", out.c_str(),
                 static_cast<double>(bytes.size()) / 1e6, grid.size.x, grid.size.y, grid.size.z,

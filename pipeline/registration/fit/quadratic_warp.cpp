@@ -557,6 +557,23 @@ double mean_gap_variance(const std::vector<double>& gaps,
     return variance;
 }
 
+// The design effect (Kish 1965) of the first `count` gaps: the variance of their mean over what it
+// would be if each gap were a draw of its own. 1: only noise is left.
+double design_effect_of(std::vector<double> gaps,
+                        std::vector<int> patch,
+                        std::size_t count,
+                        int patches,
+                        double limit) {
+    gaps.resize(count);
+    patch.resize(count);
+    double independent = 0;
+    for (const double g : gaps) {
+        const double share = std::clamp(g, -limit, limit) / static_cast<double>(count);
+        independent += share * share;
+    }
+    return mean_gap_variance(gaps, patch, patches, limit) / std::max(independent, 1e-300);
+}
+
 // Root mean squared gaps, as fitted and with each fold of patches mapped by the fit to the others.
 void cross_validate(const SkinModel& skin,
                     const RigidQuadratic& q,
@@ -600,7 +617,7 @@ void cross_validate(const SkinModel& skin,
     trust.fitted_mm = std::sqrt(fitted);
 }
 
-constexpr int kDraws = 200;  // the 95 % point of a spread is then known to 5 % of itself
+constexpr int kDraws = 200;  // their spread is then known to 5 % of itself
 
 // Maps drawn from the posterior; scale2 is the variance of one row of `factor`. The normal deviates
 // are sums of twelve uniform ones: logarithms and cosines differ between machines.
@@ -669,6 +686,8 @@ QuadraticTrust trust_quadratic(const SkinModel& skin,
     const std::vector<int> patch = patches_of(matches, &trust.patches);
     const double variance = mean_gap_variance(gaps, patch, trust.patches, limit);
     trust.standard_error_mm = std::sqrt(variance);
+    trust.design_effect =
+        design_effect_of(gaps, patch, matches.from_target.size(), trust.patches, limit);
 
     const Rows all = gap_rows(skin, q, matches, options.last_loss_mm);
     const std::vector<Point3> held = subsample(skin.points, 800);

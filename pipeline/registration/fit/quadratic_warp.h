@@ -106,6 +106,9 @@ struct QuadraticTrust {
     double sigma_mm = 0;           // robust spread of the gaps
     double standard_error_mm = 0;  // of a mean gap; gaps of one 60 mm patch count as one
     int patches = 0;
+    // Of the readings' gaps: the variance of their mean over what it would be if each were a draw
+    // of its own. 1: what is left is noise, and a quadratic may be true; from 4 on it is not.
+    double design_effect = 1;
     double fitted_mm = 0;    // root of the mean squared gap, gaps beyond 8 mm counted as 8
     double held_out_mm = 0;  // the same, but fitted without the patch of each gap
     double inside_mm = 0;    // expected error inside the body, root mean square

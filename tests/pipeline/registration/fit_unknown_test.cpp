@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "pipeline/registration/fit/point_index.h"
+#include "support/fit_report.h"
 #include "support/torso_builds.h"
 #include "support/warped_skin.h"
 
@@ -27,40 +28,43 @@ struct Body {
     std::map<std::string, std::vector<Point3>> organs;  // about 60 points of each
 };
 
-// The standard torso, a slighter one, a heavier one.
-const Body& body(int which) {
-    static const std::vector<Body> bodies = [] {
-        std::vector<AnalyticBody> shapes(3);
-        shapes[1].width_scale = 0.85;
-        shapes[1].depth_scale = 0.9;
-        shapes[2].width_scale = 1.15;
-        shapes[2].depth_scale = 1.2;
-        shapes[2].belly_mm = 30;
-        std::vector<Body> all;
-        for (const AnalyticBody& shape : shapes) {
-            Body b;
-            b.labels = sample_analytic_torso(analytic_torso_grid({3, 3, 3}), shape);
-            b.skin = *extract_skin_surface(b.labels);
-            const Grid& grid = b.labels.grid;
-            std::vector<std::size_t> voxels(256, 0), seen(256, 0);
-            for (const std::uint8_t v : b.labels.voxels) ++voxels[v];
-            std::size_t n = 0;
-            for (int k = 0; k < grid.size.z; ++k) {
-                for (int j = 0; j < grid.size.y; ++j) {
-                    for (int i = 0; i < grid.size.x; ++i) {
-                        const std::uint8_t v = b.labels.voxels[n++];
-                        const std::size_t stride = 1 + voxels[v] / 60;
-                        if (v == 0 || seen[v]++ % stride != stride / 2) continue;
-                        b.organs[b.labels.labels[v].name].push_back(
-                            grid.point_from_voxel({1.0 * i, 1.0 * j, 1.0 * k}));
-                    }
-                }
+Body body_of(const AnalyticBody& shape) {
+    Body b;
+    b.labels = sample_analytic_torso(analytic_torso_grid({3, 3, 3}), shape);
+    b.skin = *extract_skin_surface(b.labels);
+    const Grid& grid = b.labels.grid;
+    std::vector<std::size_t> voxels(256, 0), seen(256, 0);
+    for (const std::uint8_t v : b.labels.voxels) ++voxels[v];
+    std::size_t n = 0;
+    for (int k = 0; k < grid.size.z; ++k) {
+        for (int j = 0; j < grid.size.y; ++j) {
+            for (int i = 0; i < grid.size.x; ++i) {
+                const std::uint8_t v = b.labels.voxels[n++];
+                const std::size_t stride = 1 + voxels[v] / 60;
+                if (v == 0 || seen[v]++ % stride != stride / 2) continue;
+                b.organs[b.labels.labels[v].name].push_back(
+                    grid.point_from_voxel({1.0 * i, 1.0 * j, 1.0 * k}));
             }
-            all.push_back(std::move(b));
         }
-        return all;
-    }();
-    return bodies[static_cast<std::size_t>(which)];
+    }
+    return b;
+}
+
+// The standard torso, a slighter one, a heavier one: on their maps the factors were calibrated.
+// Then three bodies that they are judged on.
+const Body& body(std::size_t which) {
+    static std::map<std::size_t, Body> bodies;
+    constexpr struct {
+        double width, depth, belly_mm;
+    } kShapes[] = {{1, 1, 12},      {0.85, 0.9, 12}, {1.15, 1.2, 30},
+                   {0.95, 1.15, 5}, {1.1, 0.85, 20}, {0.8, 0.8, 0}};
+    const auto found = bodies.find(which);
+    if (found != bodies.end()) return found->second;
+    AnalyticBody shape;
+    shape.width_scale = kShapes[which].width;
+    shape.depth_scale = kShapes[which].depth;
+    shape.belly_mm = kShapes[which].belly_mm;
+    return bodies.emplace(which, body_of(shape)).first->second;
 }
 
 // A quadratic, and before it, in every second case, a skin of another build that fades with depth:
@@ -96,25 +100,36 @@ struct KnownCase {
     RegisterOptions options;
 };
 
-KnownCase known_case(int n, std::uint64_t seed = 1) {
+// Which bodies and builds: those of the calibration, or others.
+enum class Kind { calibrated, others };
+
+KnownCase known_case(int n, std::uint64_t seed = 1, Kind kind = Kind::calibrated) {
     KnownCase c;
     Random random(1000 * seed + static_cast<std::uint64_t>(n));
     KnownTruth& truth = c.truth;
-    truth.patient = &body(n % 3);
+    const bool others = kind == Kind::others;
+    truth.patient = &body(static_cast<std::size_t>(n % 3 + (others ? 3 : 0)));
     const SkinSurfaceResult& skin = truth.patient->skin;
     const double means[] = {4, 9, 14};
     truth.quadratic = random_quadratic_map(skin.box, skin.skin, random, means[(n / 5) % 3]);
     truth.centre = skin.box.centre();
     truth.index = PointIndex(skin.skin.points);
     if (n % 2 == 1) {
-        const double largest[] = {45, 30, 25, 40, 50};
-        const int build = (n / 2) % 5;
+        const struct {
+            Build build;
+            double largest_mm;
+        } builds[] = {{others ? Build::pregnant : Build::belly, others ? 75.0 : 45.0},
+                      {Build::wide, 30},
+                      {others ? Build::huge : Build::slim, others ? 90.0 : 25.0},
+                      {Build::pear, 40},
+                      {Build::gaunt, 50}};
+        const auto& [build, largest_mm] = builds[(n / 2) % 5];
         truth.built = true;
-        truth.build = kBuilds[build];
+        truth.build = build;
         truth.fade_mm = random.uniform(50, 100);
         // Slopes below 0.55: space does not fold.
         truth.amplitude =
-            random.uniform(0.3, 1) * std::min(1.0, 0.55 * truth.fade_mm / (0.86 * largest[build]));
+            random.uniform(0.3, 1) * std::min(1.0, 0.55 * truth.fade_mm / (0.86 * largest_mm));
         truth.shift_mm = random.uniform(-20, 20);
     }
     const int part = (n / 3) % 4, counts[] = {500, 2000, 1000, 1500};
@@ -153,11 +168,16 @@ KnownCase known_case(int n, std::uint64_t seed = 1) {
 struct Held {
     int turned = 0;  // cases that lie the other way round, which is said and not counted
     int structures = 0, median = 0, p90 = 0, p95 = 0, covariance90 = 0, refits90 = 0;
+    std::vector<double> errors_mm, said_mm;
 };
 
 // Fits one case and counts the structures whose error lies within what was said.
-void count(int n, const char* uncertainty, Held* held, std::uint64_t seed = 1) {
-    KnownCase c = known_case(n, seed);
+void count(int n,
+           const char* uncertainty,
+           Held* held,
+           std::uint64_t seed = 1,
+           Kind kind = Kind::calibrated) {
+    KnownCase c = known_case(n, seed, kind);
     c.options.uncertainty = uncertainty;
     const Body& patient = *c.truth.patient;
     const auto fitted = register_surfaces({patient.skin, c.sweep, &patient.labels}, c.options);
@@ -175,6 +195,13 @@ void count(int n, const char* uncertainty, Held* held, std::uint64_t seed = 1) {
             << "case " << n;
         return;
     }
+    // Gaps go together where the true map is no quadratic.
+    const double design_effect = measure(*fitted, "gap_design_effect");
+    if (!c.truth.built) {
+        EXPECT_LT(design_effect, 2) << "case " << n;
+    } else if (c.truth.build == Build::belly) {
+        EXPECT_GT(design_effect, 2) << "case " << n;
+    }
     for (const OrganUnknown& u : fitted->unknown) {
         const std::vector<Point3>& points = patient.organs.at(u.label);
         double sum = 0;
@@ -189,22 +216,33 @@ void count(int n, const char* uncertainty, Held* held, std::uint64_t seed = 1) {
         held->p95 += error <= u.p95_mm;
         held->covariance90 += error <= u.covariance.p90_mm;
         held->refits90 += error <= u.refits.p90_mm;
-        std::printf(
-            "case %d %s %s: error %.2f, said %.2f %.2f, covariance %.2f, refits %.2f, beyond a "
-            "rigid motion %.2f\n",
-            n, c.truth.built ? build_name(c.truth.build).c_str() : "quadratic", u.label.c_str(),
-            error, u.median_mm, u.p90_mm, u.covariance.p90_mm, u.refits.p90_mm, u.beyond_rigid_mm);
+        held->errors_mm.push_back(error);
+        held->said_mm.push_back(u.p90_mm);
+        if (std::getenv("SONOCASE_SHOW"))
+            std::printf("case %d %s %s: error %.2f, said %.2f %.2f, covariance %.2f, refits %.2f\n",
+                        n, c.truth.built ? build_name(c.truth.build).c_str() : "quadratic",
+                        u.label.c_str(), error, u.median_mm, u.p90_mm, u.covariance.p90_mm,
+                        u.refits.p90_mm);
     }
 }
 
-// Four of the sixty: more than half of the structures lie within the median's double, the 90 %
-// figure; fewer would say that a fit knows less than it says.
+// Four of the sixty, which are structures of two quadratics and of two bellies: of so few the share
+// that is held lies within a quarter of the 90 % that are said.
 TEST(FitUnknown, HoldsTheErrorOfKnownMaps) {
     Held held;
     for (const int n : {1, 2, 8, 11}) count(n, "off", &held);
     EXPECT_GT(held.structures, 40);
-    EXPECT_GE(held.p90, held.structures * 6 / 10);
+    EXPECT_GE(held.p90, held.structures * 65 / 100);
     EXPECT_LE(held.median, held.p90);
+}
+
+// A slim mannequin read from the front, its head direction a little off: the right pose then fits
+// worse than one that has slid 290 mm along the body and keeps 7 % of the readings.
+TEST(FitUnknown, APoseThatHasSlidOffItsReadingsIsNotTaken) {
+    const KnownCase c = known_case(5, 2);
+    const auto aligned = align_surfaces({c.truth.patient->skin, c.sweep}, c.options);
+    ASSERT_TRUE(aligned);
+    EXPECT_GT(measure(*aligned, "rigid_coverage"), 0.5);
 }
 
 TEST(FitUnknown, TheLargerOfTwoWaysIsSaid) {
@@ -232,22 +270,38 @@ TEST(FitUnknown, TheLargerOfTwoWaysIsSaid) {
     EXPECT_EQ(plain->registration.residual.control_mm, fitted->registration.residual.control_mm);
 }
 
-// The measurement behind docs/accuracy.md: run with --gtest_also_run_disabled_tests.
-// SONOCASE_CALIBRATION_SEED  another sixty maps and sweeps; 1 by default
-TEST(FitUnknown, DISABLED_CalibrationOfSixtyFits) {
+// Sixty fits with known truth: nine in ten structures lie within what is said of nine in ten. Fits
+// of one body share their error, so that the share of sixty is known to some 4 %.
+void calibration(const char* uncertainty, Kind kind) {
     const char* given = std::getenv("SONOCASE_CALIBRATION_SEED");
     const std::uint64_t seed = given ? std::strtoull(given, nullptr, 10) : 1;
     Held held;
-    for (int n = 0; n < 60; ++n) count(n, "on", &held, seed);
+    for (int n = 0; n < 60; ++n) count(n, uncertainty, &held, seed, kind);
     const auto share = [&](int part) { return 100.0 * part / std::max(1, held.structures); };
+    const auto median = [](std::vector<double> v) {
+        if (v.empty()) return 0.0;
+        std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
+        return v[v.size() / 2];
+    };
     std::printf(
-        "%d cases turned, and said so; %d structures; held by the median %.1f %%, 90 %%: %.1f %%, "
-        "95 %%: %.1f %%; the covariance "
-        "alone (90 %%) %.1f %%, the refits alone %.1f %%\n",
-        held.turned, held.structures, share(held.median), share(held.p90), share(held.p95),
-        share(held.covariance90), share(held.refits90));
+        "%d cases turned, and said so; %d structures, median error %.1f mm, said %.1f mm (90 %%); "
+        "held by the median %.1f %%, 90 %%: %.1f %%, 95 %%: %.1f %%; the covariance alone (90 %%) "
+        "%.1f %%, the refits alone %.1f %%\n",
+        held.turned, held.structures, median(held.errors_mm), median(held.said_mm),
+        share(held.median), share(held.p90), share(held.p95), share(held.covariance90),
+        share(held.refits90));
     EXPECT_GE(share(held.p90), 85);
     EXPECT_LE(share(held.p90), 95);
+}
+
+// The measurements behind docs/numerics.md: run with --gtest_also_run_disabled_tests.
+// SONOCASE_CALIBRATION_SEED  another sixty maps and sweeps; 1 by default
+TEST(FitUnknown, DISABLED_CalibrationOfSixtyFits) {
+    calibration("on", Kind::calibrated);
+}
+
+TEST(FitUnknown, DISABLED_SixtyFitsOfOtherBodies) {
+    calibration("on", Kind::others);
 }
 
 }  // namespace

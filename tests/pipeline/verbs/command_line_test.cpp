@@ -189,6 +189,19 @@ TEST(CommandLine, BuildInspectValidateAndExportATinyCase) {
     EXPECT_EQ(lines(damaged.error), 1) << damaged.error;
 }
 
+// Not only in the report: the person who asked reads it.
+TEST(CommandLine, ATimeThatWasAskedForAndMissedIsSaidAfterTheBuild) {
+    const TemporaryFolder folder;
+    folder.write("case.toml", kTinyRecipe);
+    const CommandResult build =
+        sonocase_run("build case.toml -o a.sonocase --report r.json --time-budget-s 0.01", folder);
+    ASSERT_EQ(build.status, 0) << build.error;
+    EXPECT_NE(build.error.find("warning: asked for 0.01 s, took "), std::string::npos)
+        << build.error;
+    const auto report = nlohmann::json::parse(read_text(folder / "r.json"));
+    EXPECT_TRUE(report["choice"].contains("missed"));
+}
+
 // The stages one by one, files in and files out, come to what build makes of the same inputs.
 TEST(CommandLine, StagesAloneMakeTheCaseThatBuildMakes) {
     const TemporaryFolder folder;
