@@ -250,6 +250,19 @@ Result<Sequence> load_recording_file(const std::string& files) {
     std::error_code none;
     if (comma == std::string::npos || std::filesystem::exists(files, none))
         return load_one_recording(files);
+    const std::filesystem::path probe_file = files.substr(0, comma),
+                                needle_file = files.substr(comma + 1);
+    if (std::filesystem::equivalent(probe_file, needle_file, none))
+        return Error{"probe and needle are one file", files,
+                     "expected PROBE,NEEDLE: the recording of each"};
+    const auto is_named = [](const std::filesystem::path& file, const char* role) {
+        std::string name = file.filename().string();
+        for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+        return name.find(role) != std::string::npos;
+    };
+    if (is_named(probe_file, "needle") && is_named(needle_file, "probe"))
+        return Error{"the needle's file comes first by its name", files,
+                     "expected PROBE,NEEDLE: exchange the two"};
     std::string probe_name, needle_name;
     std::vector<Message> notes;
     SONOCASE_TRY(std::vector<Pose> probe,

@@ -85,11 +85,18 @@ struct ProgressBook::Impl {
         const int code = sqlite3_errcode(db) & 0xff;
         return code == SQLITE_BUSY || code == SQLITE_LOCKED;
     }
+    // Locks that the file system refuses for another reason than that somebody has them.
+    bool cannot_lock() const {
+        const int code = sqlite3_extended_errcode(db);
+        return code == SQLITE_IOERR_LOCK || code == SQLITE_IOERR_RDLOCK ||
+               code == SQLITE_IOERR_UNLOCK || code == SQLITE_IOERR_CHECKRESERVEDLOCK;
+    }
     Error fault(const char* doing) const {
         // SQLite says the same of a lock that is held and of one that cannot be had.
         const std::string why = busy() ? "another program has it, or its folder cannot lock files "
                                          "(a network home)"
-                                       : sqlite3_errmsg(db);
+                                : cannot_lock() ? "its folder cannot lock files (a network home)"
+                                                : sqlite3_errmsg(db);
         return {std::string(doing) + ": " + why, path, "earlier sessions are unchanged"};
     }
     bool run(const char* sql) {

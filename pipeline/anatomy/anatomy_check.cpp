@@ -419,6 +419,10 @@ class Check {
             exchanged(as_is);
             two_in_one();
             if (best_.score - right_.score > options_.margin) report.findings.push_back(finding());
+            if (report.findings.empty()) {
+                out_of_place(report);
+                unusual_size(report);
+            }
             remarks(report);
         }
         volumes(report);
@@ -651,9 +655,9 @@ class Check {
             const double usual = right_.axes[r].at(b.at) - right_.axes[r].at(a.at);
             const double v = variance(seen_[i], a, r, r, right_.axes[r].size, body_.voxel_mm[r]) +
                              variance(seen_[j], b, r, r, right_.axes[r].size, body_.voxel_mm[r]);
-            const auto exchanged_against_right = [&](double v) {
-                return student((seen + usual) * (seen + usual) / v, 1) -
-                       student((seen - usual) * (seen - usual) / v, 1);
+            const auto exchanged_against_right = [&](double spread2) {
+                return student((seen + usual) * (seen + usual) / spread2, 1) -
+                       student((seen - usual) * (seen - usual) / spread2, 1);
             };
             gain += exchanged_against_right(v * (1 - together)) - exchanged_against_right(v);
         }
@@ -774,7 +778,8 @@ class Check {
         f.margin = best_.score - right_.score;
         const std::string turn =
             options_.mesh
-                ? "; give --axes lps or ras, whichever this is not read as"
+                ? "; give --axes lps or ras if the file holds one of them, else turn it in the "
+                  "program that made it (x to the right, y to the front, z to the head)"
                 : "; where the header has two transforms give the other, --orientation sform or "
                   "qform, else write the file again from the program that made it";
         constexpr const char* kAxes[] = {"left to right", "back to front", "feet to head"};
@@ -854,7 +859,8 @@ class Check {
                          torso_model()[best_.second].name +
                          " as well; give each a label of its own";
                 break;
-            case AnatomyCause::volumes: break;
+            case AnatomyCause::volumes:
+            case AnatomyCause::out_of_place: break;
         }
         return f;
     }
@@ -898,6 +904,53 @@ class Check {
                      "; check names and unit, --table and --scale";
             report.findings.push_back(f);
         }
+    }
+
+    // Organs that lie far from where all others say, as a mask that was flipped or moved alone. Of
+    // many the fit is wrong, and nothing is said of one.
+    void out_of_place(AnatomyReport& report) const {
+        constexpr double kFar_mm = 80, kFarSpreads = 5;
+        std::string list;
+        int count = 0;
+        for (std::size_t i = 0; i < seen_.size(); ++i) {
+            if (names_[i] == nullptr || seen_[i].cut) continue;
+            double spreads2 = 0;
+            Vector3 off;
+            for (int r = 0; r < 3; ++r) {
+                const AxisFit& a = right_.axes[r];
+                off[r] = seen_[i].label->centre[r] - a.at(names_[i]->at);
+                spreads2 += off[r] * off[r] /
+                            variance(seen_[i], *names_[i], r, a.m, a.size, body_.voxel_mm[r]);
+            }
+            if (norm(off) < kFar_mm || spreads2 < kFarSpreads * kFarSpreads) continue;
+            list += text("%s'%s' lies %.0f mm", count++ > 0 ? " and " : "",
+                         seen_[i].label->name.c_str(), norm(off));
+        }
+        if (count == 0 || count > 2 || 4 * count > known()) return;
+        AnatomyFinding f;
+        f.cause = AnatomyCause::out_of_place;
+        f.text = list +
+                 " from its usual place among the others: its mask was flipped or moved alone, or "
+                 "the name is another structure's; look at it, and give a --table with the right "
+                 "names if it is the name";
+        report.findings.push_back(f);
+    }
+
+    void unusual_size(AnatomyReport& report) const {
+        constexpr double kSmall = 0.65, kLarge = 1.28;  // of an adult, at steps of 15 %
+        const double size = std::exp(kStep * (right_.k[0] + right_.k[1] + right_.k[2]) / 3.0);
+        if (size < kSmall)
+            report.size = text(
+                "the body is about %.2g times as large as an adult's: a small child, or "
+                "voxels that are larger than the file says; compare its width with the "
+                "scan's, and give --scale if they differ",
+                size);
+        else if (size > kLarge)
+            report.size = text(
+                "the body is about %.2g times as large as an adult's: a very large person, or "
+                "voxels that are smaller than the file says; compare its width with the "
+                "scan's, and give --scale if they differ",
+                size);
     }
 
     void remarks(AnatomyReport& report) const {
@@ -1080,6 +1133,7 @@ std::string AnatomyReport::verdict() const {
     if (findings.empty())
         out = checked ? "agrees: " + std::to_string(known) + " named organs"
                       : "not checked: only " + std::to_string(known) + " named organs";
+    if (!size.empty()) out += "; " + size;
     for (const std::string& remark : remarks) out += "; " + remark;
     return out;
 }
@@ -1095,6 +1149,7 @@ std::optional<std::string> report_anatomy(const LabelVolume& labels,
         report.warnings.push_back("anatomy: " + f.text);
         if (f.error && !error) error = f.text;
     }
+    if (!anatomy.size.empty()) report.warnings.push_back("anatomy: " + anatomy.size);
     return error;
 }
 

@@ -71,6 +71,7 @@ enum class AnatomyCause : std::uint8_t {
     names_exchanged,  // labels whose names fit each other, or other structures
     two_in_one,       // one name covers two structures
     volumes,          // organs of a volume that no body has
+    out_of_place,     // one or two organs far from where the others say
 };
 
 struct AnatomyFinding {
@@ -86,6 +87,9 @@ struct AnatomyReport {
     int known = 0;  // labels whose names the model knows
     bool checked = false;
     std::vector<AnatomyFinding> findings;
+    // A body far smaller or larger than an adult's, which may be a child's, or a wrong voxel size;
+    // a whole sentence, else empty.
+    std::string size;
     std::vector<std::string> remarks;  // worth knowing, no warning: organs that are not there, cuts
 
     // "agrees: 24 of 25 known structures", "not checked: only 2 named organs", or the findings.

@@ -43,10 +43,10 @@ std::vector<Line> lines_of(std::string_view text) {
         if (trimmed(line).empty()) continue;
         // "[1, 2, 3]," and "(1, 2, 3)" as programs print them.
         if (line.front() == '[' || line.front() == '(') {
-            const std::size_t end = line.find_last_not_of(",; ");
-            const char last = line[end];
+            const std::size_t close = line.find_last_not_of(",; ");
+            const char last = line[close];
             if ((last == ']' || last == ')') && line.find_first_of("[(", 1) == line.npos)
-                line = trimmed(line.substr(1, end - 1));
+                line = trimmed(line.substr(1, close - 1));
             if (line.empty()) continue;
         }
         const bool comment = line.front() == '#' || line.front() == '%' || line.starts_with("//");

@@ -56,6 +56,68 @@ Status check_source_file(const std::string& path, const std::string& expected) {
     return expect_no_foreign(path);
 }
 
+std::optional<Error> foreign_format(const std::string& path) {
+    struct Format {
+        std::string_view ending;
+        const char* kind;
+        const char* advice;
+    };
+    constexpr const char* kSurface =
+        "export it as .glb, .stl, .ply or .obj; organs as one .glb or a folder of .stl";
+    constexpr const char* kVolume = "write it as .nii.gz or .nrrd (3D Slicer, nibabel)";
+    constexpr const char* kUnpack = "unpack it, and give what it holds";
+    constexpr Format kFormats[] = {
+        {".gltf", "glTF whose parts may lie in several files", "export it as one .glb"},
+        {".fbx", "an FBX scene", kSurface},
+        {".dae", "a Collada scene", kSurface},
+        {".3mf", "a 3MF file", kSurface},
+        {".off", "an OFF surface", kSurface},
+        {".wrl", "a VRML scene", kSurface},
+        {".x3d", "an X3D scene", kSurface},
+        {".step", "a CAD model", kSurface},
+        {".stp", "a CAD model", kSurface},
+        {".blend", "a Blender scene", kSurface},
+        {".usdz", "a USD scene", kSurface},
+        {".vtu", "an unstructured grid", kSurface},
+        {".pcd", "a cloud of PCL", "convert it to .ply (pcl_pcd2ply)"},
+        {".e57", "a laser scan", "export it as .ply or .xyz (CloudCompare)"},
+        {".las", "a laser scan", "export it as .ply or .xyz (CloudCompare)"},
+        {".hdr", "one of the two files of an Analyze or NIfTI pair", kVolume},
+        {".img", "one of the two files of an Analyze or NIfTI pair", kVolume},
+        {".img.gz", "one of the two files of an Analyze or NIfTI pair", kVolume},
+        {".mgz", "a volume of FreeSurfer", "convert it: mri_convert IN.mgz OUT.nii.gz"},
+        {".mgh", "a volume of FreeSurfer", "convert it: mri_convert IN.mgh OUT.nii.gz"},
+        {".mnc", "a MINC volume", kVolume},
+        {".gipl", "a GIPL volume", kVolume},
+        {".vti", "a volume of VTK", kVolume},
+        {".npy", "an array of NumPy, which has no geometry", kVolume},
+        {".npz", "arrays of NumPy, which have no geometry", kVolume},
+        {".mat", "data of MATLAB", kVolume},
+        {".h5", "an HDF5 file", kVolume},
+        {".hdf5", "an HDF5 file", kVolume},
+        {".tif", "a TIFF picture, which has no geometry", kVolume},
+        {".tiff", "a TIFF picture, which has no geometry", kVolume},
+        {".raw", "voxels without a header", "give the header beside it (.mhd or .nhdr)"},
+        {".zraw", "voxels without a header", "give the header beside it (.mhd)"},
+        {".mrb", "a scene of 3D Slicer", "save the segmentation itself, as .seg.nrrd"},
+        {".nii.bz2", "packed", kUnpack},
+        {".nii.xz", "packed", kUnpack},
+        {".nii.zst", "packed", kUnpack},
+        {".zip", "an archive", kUnpack},
+        {".tar", "an archive", kUnpack},
+        {".tgz", "an archive", kUnpack},
+        {".tar.gz", "an archive", kUnpack},
+        {".7z", "an archive", kUnpack},
+        {".rar", "an archive", kUnpack}};
+    const std::string name = lower_case(path);
+    for (const Format& format : kFormats)
+        if (name.ends_with(format.ending))
+            return Error{std::string("is ") + format.kind + " (" + std::string(format.ending) +
+                             "), which is not read",
+                         path, format.advice};
+    return std::nullopt;
+}
+
 Status check_source_folder(const std::string& folder, const std::string& expected) {
     std::error_code code;
     for (const auto& entry : fs::directory_iterator(folder, code)) {

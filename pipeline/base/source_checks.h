@@ -22,6 +22,10 @@ namespace sonocase::pipeline::inline base {
 // `expected` is the text that says what the caller reads: "expected a surface file".
 Status check_source_file(const std::string& path, const std::string& expected);
 
+// What a file of a format that no reader here takes is by its name, and how to bring what it holds;
+// nothing for other names.
+std::optional<Error> foreign_format(const std::string& path);
+
 // Done if the folder's own entries are files and folders only, so that a library that opens every
 // entry comes to an end. Subfolders are not looked into.
 Status check_source_folder(const std::string& folder, const std::string& expected);

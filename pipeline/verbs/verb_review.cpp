@@ -113,6 +113,13 @@ int verb_score(int argc, char** argv) {
         names.needle_axis = *axis;
         if (!a.probe.empty()) names.probe = a.probe;
         if (!a.needle.empty()) names.needle = names.drawn = a.needle;
+        if (!names.probe.empty() && names.needle.empty())
+            for (const std::string& other : sequence.transforms)
+                if (other != names.probe)
+                    std::fprintf(stderr,
+                                 "sonocase score: note: %s is not scored: if it is the needle, "
+                                 "give --needle %s\n",
+                                 other.c_str(), other.c_str());
         return session_from_sequence(sequence, names, a.session);
     }();
     if (!session) return fail("score", session.error());

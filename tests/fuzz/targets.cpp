@@ -31,6 +31,7 @@
 #include "formats/text/stage_report_json.h"
 #include "pipeline/anatomy/label_table.h"
 #include "pipeline/base/point_table.h"
+#include "pipeline/import/mesh/glb_file.h"
 #include "pipeline/import/mesh/polygon_file.h"
 #include "pipeline/import/volume/dicom_frames.h"
 #include "pipeline/import/volume/dicom_segmentation.h"
@@ -391,6 +392,18 @@ void vtk(Bytes bytes) {
     pipeline::is_vtk_surface(file.path());
 }
 
+void glb(Bytes bytes) {
+    std::vector<std::string> aside;
+    const auto nodes = pipeline::read_glb(bytes, "fuzz", &aside);
+    check_error(nodes);
+    if (!nodes) return;
+    for (const pipeline::MeshNode& node : *nodes) {
+        demand(!node.surface.triangles.empty());
+        for (const auto& triangle : node.surface.triangles)
+            for (const std::uint32_t corner : triangle) demand(corner < node.surface.points.size());
+    }
+}
+
 void point_table(Bytes bytes) {
     for (const bool often : {false, true}) {
         auto read = pipeline::parse_point_table(text_of(bytes), "fuzz", {often, often});
@@ -521,6 +534,7 @@ const std::vector<Target>& targets() {
         {"ply", ply},
         {"stl", stl},
         {"vtk", vtk},
+        {"glb", glb},
         {"point_table", point_table},
         {"markups", markups},
         {"viper", viper},

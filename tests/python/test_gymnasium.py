@@ -36,6 +36,23 @@ def test_reset_and_step_repeat_to_the_last_fact(case, task):
     assert isinstance(runs[0][1], dict) and len(runs[0][2]) == 5
 
 
+def unknown(facts):
+    """Names of dictionaries' entries that hold nothing: Gymnasium's vector environments put a number's place at an array of
+    numbers, which takes no None."""
+    if isinstance(facts, list):
+        return [name for fact in facts for name in unknown(fact)]
+    if not isinstance(facts, dict):
+        return []
+    return [name for name, fact in facts.items() if fact is None or isinstance(fact, float) and fact != fact] + [
+        name for fact in facts.values() for name in unknown(fact)]
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_what_is_not_known_is_left_out_of_the_facts(case, task):
+    _, info = VectorEnvironment(case, task, 2, size=(32, 32)).reset()
+    assert set(unknown(info["facts"])) <= {"tip"}  # of a task without a needle in all its environments
+
+
 STAND_IN = {
     "__init__.py": """
 class Env:

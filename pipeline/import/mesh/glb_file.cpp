@@ -16,6 +16,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::uint32_t kMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinChunk = 0x004E4942;
+constexpr std::size_t kTriangles = 4, kStrip = 5, kFan = 6;  // modes of a primitive
 constexpr const char* kAgain = "check that the file is complete; export it again";
 
 std::uint32_t word_at(std::span<const std::uint8_t> bytes, std::size_t at) {
@@ -76,7 +77,13 @@ class Reader {
             }
             MeshNode node;
             node.name = "node_" + std::to_string(n);
-            if (const Json& name = member(nodes[n], "name"); name.is_string())
+            // Some programs name the meshes alone.
+            const Json& meshes = member(json_, "meshes");
+            const std::size_t mesh = index(nodes[n]["mesh"]);
+            if (meshes.is_array() && mesh < meshes.size())
+                if (const Json& name = member(meshes[mesh], "name"); is_name(name))
+                    node.name = name.get<std::string>();
+            if (const Json& name = member(nodes[n], "name"); is_name(name))
                 node.name = name.get<std::string>();
             if (!shown[n]) {
                 if (aside != nullptr) aside->push_back(node.name);
@@ -90,6 +97,10 @@ class Reader {
             if (is_morphed(nodes[n], index(nodes[n]["mesh"])))
                 return Error{"'" + node.name + "' is bent by shape keys (weights of targets)",
                              where_, "apply the shape keys to the mesh and export it again"};
+            if (node.surface.triangles.empty()) {  // lines or points alone, such as a grid
+                if (aside != nullptr) aside->push_back(node.name);
+                continue;
+            }
             for (Point3& p : node.surface.points) p = to_scene * p;
             nodes_.push_back(std::move(node));
         }
@@ -121,6 +132,10 @@ class Reader {
             add(member(nodes[n], "children"));
         }
         return shown;
+    }
+
+    static bool is_name(const Json& name) {
+        return name.is_string() && !name.get_ref<const std::string&>().empty();
     }
 
     // Extensions that change how a surface looks, and not where it lies.
@@ -227,8 +242,9 @@ class Reader {
         const Json& meshes = member(json_, "meshes");
         if (!meshes.is_array() || mesh >= meshes.size()) return fault("a mesh is not there");
         for (const Json& primitive : member(meshes[mesh], "primitives")) {
-            if (index_or(primitive, "mode", 4) != 4)
-                return fault("a mesh is not made of single triangles");
+            const std::size_t mode = index_or(primitive, "mode", kTriangles);
+            if (mode < kTriangles) continue;  // points and lines bound nothing
+            if (mode > kFan) return fault("a mesh is made of what glTF does not know");
             SONOCASE_TRY(
                 auto points,
                 view(index_or(member(primitive, "attributes"), "POSITION", SIZE_MAX), 3, "VEC3"));
@@ -268,9 +284,24 @@ class Reader {
                 corners.push_back(static_cast<std::uint32_t>(n));
         }
         const auto base = static_cast<std::uint32_t>(first);
-        for (std::size_t n = 0; n + 2 < corners.size(); n += 3)
-            surface.triangles.push_back(
-                {base + corners[n], base + corners[n + 1], base + corners[n + 2]});
+        const std::size_t mode = index_or(primitive, "mode", kTriangles);
+        const auto add = [&](std::size_t a, std::size_t b, std::size_t c) {
+            // A strip turns its corners by triangles without an area.
+            const bool flat =
+                corners[a] == corners[b] || corners[b] == corners[c] || corners[c] == corners[a];
+            if (mode == kTriangles || !flat)
+                surface.triangles.push_back(
+                    {base + corners[a], base + corners[b], base + corners[c]});
+        };
+        const std::size_t step = mode == kTriangles ? 3 : 1;
+        for (std::size_t n = 0; n + 2 < corners.size(); n += step) {
+            if (mode == kFan)
+                add(0, n + 1, n + 2);
+            else if (mode == kStrip && n % 2 == 1)  // every second one is wound the other way
+                add(n + 1, n, n + 2);
+            else
+                add(n, n + 1, n + 2);
+        }
         return Done{};
     }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -272,14 +273,37 @@ bool names_no_vertex(vtkPolyData& data) {
     return false;
 }
 
-// The comments of an OBJ, whichever line they stand in. VTK takes "1,5" for 1 and says nothing:
-// coordinates are looked at here.
+// The numbers behind the "v" of an OBJ's vertex.
+std::vector<double> vertex_numbers(const std::string& line) {
+    std::vector<double> numbers;
+    const char* at = line.c_str() + 1;
+    for (char* end = nullptr; numbers.size() < 8; at = end) {
+        const double number = std::strtod(at, &end);
+        if (end == at) break;
+        numbers.push_back(number);
+    }
+    return numbers;
+}
+
+// The comments of an OBJ, whichever line they stand in. VTK takes "1,5" for 1 and leaves weights
+// out, and says nothing: coordinates are looked at here.
 Result<Axes> axes_of_obj(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
     Axes axes = Axes::unsaid;
     int number = 0;
+    bool first = true, weights = false;
     for (std::string line; std::getline(file, line);) {
         ++number;
+        if (line.starts_with("v ") && (first || weights)) {
+            const std::vector<double> numbers = vertex_numbers(line);
+            weights = numbers.size() == 4;
+            first = false;
+            if (weights && numbers[3] != 1)
+                return Error{
+                    "a vertex has a fourth number, a weight, that is not 1: " + line.substr(0, 60),
+                    path + ":" + std::to_string(number),
+                    "expected x, y and z alone: export it again without weights"};
+        }
         if (line.starts_with("v ") && line.find(',') != std::string::npos)
             return Error{"a vertex has a comma among its numbers: " + line.substr(0, 40),
                          path + ":" + std::to_string(number),

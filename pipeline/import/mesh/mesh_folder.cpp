@@ -140,10 +140,21 @@ Result<Grid> grid_of(const std::vector<Organ>& organs,
     if (box.empty()) return Error{"no node has a triangle", where, "expected organ meshes"};
     const Vector3 extent = box.extent();
     const double longest = std::max({extent.x, extent.y, extent.z});
-    if (longest < 20 || longest > 3000)
-        return Error{"the meshes are " + number_text(longest, 4) + " mm long", where,
-                     longest < 20 ? "are they in metres? give the scale: --scale 1000"
-                                  : "are they in micrometres? give the scale: --scale 0.001"};
+    if (longest < 20 || longest > 3000) {
+        std::string advice = scale_advice(extent / options.scale, "--scale");
+        const bool glb = std::any_of(organs.begin(), organs.end(), [](const Organ& organ) {
+            return std::any_of(organ.files.begin(), organ.files.end(), [](const std::string& file) {
+                return lower_case(file).ends_with(".glb");
+            });
+        });
+        if (glb && longest > 3000 && options.scale == 1)
+            advice = longest > 100000
+                         ? "a GLB counts in metres, and these look like millimetres: give --scale "
+                           "0.001"
+                         : "a GLB counts in metres, and these look like centimetres: give --scale "
+                           "0.01";
+        return Error{"the meshes are " + number_text(longest, 4) + " mm long", where, advice};
+    }
     box.lower.z = std::max(box.lower.z, options.low_mm);
     box.upper.z = std::min(box.upper.z, options.high_mm);
     if (!(box.lower.z < box.upper.z))

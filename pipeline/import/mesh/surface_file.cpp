@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <optional>
 #include <tuple>
 #include <unordered_map>
 #include <vector>
@@ -179,6 +180,37 @@ Result<GivenSurface> read_given(const std::string& path,
     return GivenSurface{std::move(file.surface), file.axes, file.unit_mm};
 }
 
+// Few points far from all others make a torso look too large.
+std::optional<Error> far_points(const std::vector<Point3>& points, const std::string& path) {
+    Box3 most;  // of all points but one in a hundred on each side
+    const std::size_t aside = points.size() / 100;
+    Point3 low, high;
+    std::vector<double> sorted(points.size());
+    for (int a = 0; a < 3; ++a) {
+        for (std::size_t n = 0; n < points.size(); ++n) sorted[n] = points[n][a];
+        std::sort(sorted.begin(), sorted.end());
+        low[a] = sorted[aside];
+        high[a] = sorted[points.size() - 1 - aside];
+    }
+    most.include(low);
+    most.include(high);
+    if (aside == 0 || check_torso_extent(most.extent(), "", "", "")) return std::nullopt;
+    std::size_t count = 0;
+    Point3 example;
+    for (const Point3 p : points) {
+        bool far = false;
+        for (int a = 0; a < 3; ++a) {
+            const double room = most.extent()[a] + 100;
+            far = far || p[a] < low[a] - room || p[a] > high[a] + room;
+        }
+        if (far && ++count == 1) example = p;
+    }
+    if (count == 0) return std::nullopt;
+    return Error{text("%zu of %zu points lie far from all others, such as %.6g, %.6g, %.6g", count,
+                      points.size(), example.x, example.y, example.z),
+                 path, "take them away (MeshLab, CloudCompare), or delete their rows"};
+}
+
 void turn(Surface& surface, Axes axes) {
     if (axes != Axes::lps) return;
     for (Point3& p : surface.points) p = to_ras(p, axes);
@@ -271,11 +303,13 @@ Result<Surface> import_surface(const std::string& path,
     const bool cloud = ending == ".csv" || ending == ".xyz" || ending == ".txt" ||
                        ending == ".pts" || ending == ".asc" || ending == ".tsv" ||
                        ending == ".fcsv" || is_markups_file(path);
-    if (!mesh && !cloud)
+    if (!mesh && !cloud) {
+        if (auto foreign = foreign_format(path)) return *std::move(foreign);
         return Error{
             "not a known surface file name", path,
             "expected .ply, .stl, .obj, .vtp, .vtk, .glb, .csv, .tsv, .txt, .xyz, .fcsv or "
             ".mrk.json"};
+    }
     SONOCASE_TRY(auto given, read_given(path, options, mesh, own));
     Surface& surface = given.surface;
     if (surface.points.empty())
@@ -283,11 +317,11 @@ Result<Surface> import_surface(const std::string& path,
                      "expected the digitised skin; check that this is the right file"};
     if (const std::size_t holes = leave_out_holes(surface); holes > 0)
         own.warnings.push_back(std::to_string(holes) +
-                               " points that are no numbers (NaN), as depth cameras write them for "
+                               " points without a position (NaN), as depth cameras write them for "
                                "what they do not see, were left out");
     for (const Point3 p : surface.points)
         if (!is_finite(p))
-            return Error{"a triangle has a corner that is no number (NaN)", path,
+            return Error{"a triangle's corner is not a number (NaN)", path,
                          "take such vertices away (MeshLab: Filters, Cleaning and Repairing) and "
                          "export it again"};
     if (surface.points.empty())
@@ -328,6 +362,7 @@ Result<Surface> import_surface(const std::string& path,
         // The advice is for the file as it is.
         const double told = glb ? options.scale : mm;
         if (auto error = check_torso_extent(box.extent(), "surface", path, "--scale")) {
+            if (auto far = far_points(surface.points, path)) return *std::move(far);
             if (told != 1) error->expected = scale_advice(box.extent() / told, "--scale");
             return *error;
         }
@@ -337,8 +372,11 @@ Result<Surface> import_surface(const std::string& path,
         // Folds that the reduction of a dense scan leaves are no fault of the file.
         const std::size_t turned = orient_outwards(surface);
         if (turned > 0 && own.measures.empty())
-            own.warnings.push_back(std::to_string(turned) +
-                                   " triangles faced inwards and were turned");
+            own.warnings.push_back(
+                std::to_string(turned) + " triangles faced inwards and were turned" +
+                (turned == surface.triangles.size()
+                     ? "; all triangles do where a mesh was mirrored: check its sides"
+                     : ""));
         add_vertex_normals(surface);
     }
     const std::vector<Measure> reduction = std::move(own.measures);

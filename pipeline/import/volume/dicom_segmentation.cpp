@@ -29,7 +29,8 @@ constexpr DicomTag kCharacterSet = 0x00080005, kSopClass = 0x00080016, kCode = 0
                    kType = 0x00620001, kSegments = 0x00620002, kSegmentNumber = 0x00620004,
                    kLabel = 0x00620005, kColour = 0x0062000d, kMaximum = 0x0062000e,
                    kPropertyType = 0x0062000f, kFractionalType = 0x00620010,
-                   kTypeModifier = 0x00620011, kPerFrame = 0x52009230;
+                   kTypeModifier = 0x00620011, kRegion = 0x00082218, kRegionModifier = 0x00082220,
+                   kPerFrame = 0x52009230;
 
 constexpr const char* kAgain = "write the segmentation again";
 constexpr const char* kUnpack = "unpack it first: dcmdrle, dcmdjpeg or dcmdjpls of DCMTK";
@@ -132,6 +133,11 @@ Result<std::vector<Segment>> segments_of(const DicomSet& set, const std::string&
             if (const auto sides = items_of(type, kTypeModifier); !sides.empty())
                 segment.modifier = words(sides.front(), kMeaning);
         }
+        // Older writers give the side with the region of the body.
+        if (const auto regions = items_of(item, kRegion);
+            segment.modifier.empty() && !regions.empty())
+            if (const auto sides = items_of(regions.front(), kRegionModifier); !sides.empty())
+                segment.modifier = words(sides.front(), kMeaning);
         if (says_nothing(segment.name) && !meaning.empty())
             segment.name = segment.modifier.empty() ? meaning : meaning + " " + segment.modifier;
         if (segment.name.empty()) segment.name = "segment_" + std::to_string(segment.number);

@@ -733,6 +733,32 @@ double scan_step_mm(const DicomObject& segmentation, std::vector<DicomSlice> sli
            static_cast<double>(stack->slices.size() - 1);
 }
 
+// Whether the voxels are few different numbers, as those of labels are and those of a scan are not.
+bool hold_labels(const NativeVolume& volume) {
+    constexpr std::size_t kMostLabels = 160;  // a scan of 8 bits has some 250 different values
+    std::vector<bool> seen(1 << 16, false);
+    std::size_t count = 0;
+    const std::size_t bytes = bytes_of(volume.component);
+    if (bytes > 2) return false;
+    for (std::size_t at = 0; at + bytes <= volume.bytes.size(); at += bytes) {
+        std::uint16_t value = 0;
+        std::memcpy(&value, volume.bytes.data() + at, bytes);
+        if (seen[value]) continue;
+        seen[value] = true;
+        if (++count > kMostLabels) return false;
+    }
+    return true;
+}
+
+Result<NativeVolume> read_slices(const DicomFolder& folder,
+                                 bool resample_shear,
+                                 const std::string& path) {
+    SONOCASE_TRY(auto stack, dicom_stack(folder.slices, path));
+    if (!folder.others.empty())
+        stack.warnings.push_back("left out of the DICOM folder: " + objects_text(folder.others));
+    return read_stack(stack, resample_shear, path);
+}
+
 Result<NativeVolume> read_headed(const DicomFolder& folder,
                                  bool resample_shear,
                                  const std::string& path) {
@@ -756,12 +782,22 @@ Result<NativeVolume> read_headed(const DicomFolder& folder,
             volume.notes.push_back({"left_out", "of the folder: " + objects_text(others)});
         return volume;
     }
-    if (!folder.structure_sets.empty())
+    if (!folder.structure_sets.empty()) {
+        // Slices that are labels themselves need none.
+        if (auto slices = read_slices(folder, resample_shear, path);
+            slices && hold_labels(*slices)) {
+            slices->warnings.push_back(
+                "the contours of " +
+                fs::path(folder.structure_sets.front().path).filename().string() +
+                " (RTSTRUCT) are not read: the labels are the values of the slices beside it");
+            return slices;
+        }
         return Error{"a DICOM structure set (RTSTRUCT): contours, which are not read",
                      folder.structure_sets.front().path,
                      "expected voxels: make a DICOM segmentation or masks of it, in 3D Slicer with "
                      "SlicerRT, or: plastimatch convert --input FILE --referenced-ct SERIES "
                      "--output-prefix masks --prefix-format nrrd"};
+    }
     if (!folder.damaged.empty()) return damaged(folder.damaged.front());
     if (folder.slices.empty() && !folder.others.empty())
         return Error{"holds no labels: " + objects_text(folder.others), path,
@@ -772,10 +808,7 @@ Result<NativeVolume> read_headed(const DicomFolder& folder,
         if (folder.slices.front().frames.size() == 1)
             return Error{"one DICOM slice of a series", path, "give the folder of the series"};
     }
-    SONOCASE_TRY(auto stack, dicom_stack(folder.slices, path));
-    if (!folder.others.empty())
-        stack.warnings.push_back("left out of the DICOM folder: " + objects_text(folder.others));
-    return read_stack(stack, resample_shear, path);
+    return read_slices(folder, resample_shear, path);
 }
 
 }  // namespace
@@ -827,6 +860,9 @@ VolumeSize size_in_dicom(const std::string& path) {
 Result<NativeVolume> read_dicom(const std::string& path, bool resample_shear) {
     const QuietLibrary quiet;
     itk::Object::GlobalWarningDisplayOff();
+    if (lower_case(fs::path(path).filename().string()) == "dicomdir")
+        return Error{"is the index of a disc (DICOMDIR), which holds no voxels", path,
+                     "give the folder of the series or of the segmentation"};
     try {
         return read_headed(read_dicom_headers(path), resample_shear, path);
     } catch (const std::exception&) {

@@ -143,6 +143,9 @@ Result<NativeVolume> read_itk_volume(const std::string& path, const VolumeReadin
     const char* todo = "check that the file is complete; export it again";
     SONOCASE_TRY_DONE(check_data_files(path));
     SONOCASE_TRY(const auto placement, placement_in_header(path));
+    if (has_ending(path, ".nrrd") || has_ending(path, ".nhdr")) {
+        SONOCASE_TRY_DONE(check_nrrd_encoding(header_text(path), path));
+    }
     if (is_bzip2_nrrd(path)) return read_bzip2_nrrd(path, placement, reading);
     const QuietLibrary quiet;  // the C libraries below ITK print as well as throw
     itk::Object::GlobalWarningDisplayOff();
@@ -174,8 +177,8 @@ Result<NativeVolume> read_itk_volume(const std::string& path, const VolumeReadin
             return Error{"header asks for " + std::to_string(bytes >> 30) + " GB of voxels", path,
                          todo};
         // A file that is cut off is refused before room is made for what its header promises.
-        SONOCASE_TRY_DONE(check_meta_length(path, bytes));
-        SONOCASE_TRY_DONE(check_nrrd_length(path, bytes));
+        SONOCASE_TRY_DONE(check_meta_length(path, bytes, volume.warnings));
+        SONOCASE_TRY_DONE(check_nrrd_length(path, bytes, volume.warnings));
         SONOCASE_TRY_DONE(check_room(volume, bytes, path));
         volume.bytes.resize(bytes);
         itk::ImageIORegion region(dimensions);

@@ -153,7 +153,16 @@ Result<NameSources> name_sources(const LabelLayers& file,
     }
     auto segments = segments_of_fields(file.fields, path);
     if (!segments && !given) return segments.error();
-    if (segments) sources.segments = *std::move(segments);
+    if (segments) {
+        if (Status fine = check_table(*segments, path); !fine && !given) {
+            Error twice = fine.error();
+            twice.expected =
+                "its segments have one LabelValue on one Layer: save the segmentation "
+                "again, or give --table with one name for the value";
+            return twice;
+        }
+        sources.segments = *std::move(segments);
+    }
     if (is_nifti_name(path)) {
         auto table = load_nifti_label_table(path, options.reading.orientation);
         if (table && check_table(*table, path)) {
@@ -360,12 +369,30 @@ void leave_out_background(StructureList& list) {
         }
         if (outside && s.voxels > 0)
             list.warnings.push_back(
-                "value " + std::to_string(s.entry.value) +
+                (s.entry.value == 0 ? "the mask" : "value " + std::to_string(s.entry.value)) +
                 (name.empty() ? " holds all corners of the map, and no voxel is 0: it is"
                               : " ('" + s.entry.name + "') is") +
                 " taken as the outside; if it is a structure, give it a name with --table");
         return outside;
     });
+}
+
+// Labels are small numbers: multiples of 256 alone are their bytes in the other order.
+Status check_byte_order(const StructureList& list,
+                        const NameSources& sources,
+                        const std::string& path) {
+    if (list.structures.size() < 2) return Done{};
+    for (const Structure& s : list.structures) {
+        if (s.entry.value % 256 != 0) return Done{};
+        for (const LabelTable& table : sources.tables)
+            if (entry_of(table, s.entry.value) != nullptr) return Done{};
+    }
+    return Error{"every value is a multiple of 256, such as " +
+                     std::to_string(list.structures.front().entry.value),
+                 path,
+                 "the bytes of its voxels lie in the other order than its header says "
+                 "(BinaryDataByteOrderMSB, endian): correct it there; if the values are right, "
+                 "give --table with their names"};
 }
 
 // Reads a single file or a DICOM series.
@@ -403,6 +430,7 @@ Result<StructureList> read_label_file(const std::string& path, const ImportOptio
         }
     }
 
+    SONOCASE_TRY_DONE(check_byte_order(list, sources, path));
     bool none_named = true, unlike_total = false;
     std::map<int, int> layers_with;  // how many layers hold a value
     for (const Structure& s : list.structures) ++layers_with[s.entry.value];
@@ -497,6 +525,66 @@ Status join_masks(const Grid& base,
     return Done{};
 }
 
+// A mask holds 0 and one other value, or one value alone.
+Status check_mask(const LabelLayers& mask, const std::string& path) {
+    if (mask.layers.size() != 1 || mask.values.size() > 2)
+        return Error{"mask holds " + std::to_string(mask.values.size()) + " different values", path,
+                     "expected 0 and one other value in each file of the folder: give a label map "
+                     "by its own path, and keep the scan itself in another folder than its masks"};
+    if (mask.values.size() == 2 && mask.values[0] != 0 && mask.values[1] != 0)
+        return Error{"mask holds the values " + std::to_string(mask.values[0]) + " and " +
+                         std::to_string(mask.values[1]) + " and no 0",
+                     path,
+                     "expected 0 outside the structure: write 0 in the place of the one that "
+                     "is outside"};
+    return Done{};
+}
+
+// Files of one case often have a part of their names in common ("case01_liver", "liver_mask").
+// Where no name is known with it and most are without it, it is left out.
+void leave_out_common_parts(std::vector<Structure>& structures, std::vector<Note>& notes) {
+    if (structures.size() < 2) return;
+    const auto known = [&](std::size_t cut_front, std::size_t cut_back) {
+        std::size_t count = 0;
+        for (const Structure& s : structures) {
+            const std::string& name = s.entry.name;
+            if (name.size() <= cut_front + cut_back) return std::size_t{0};
+            count += is_known_structure(name.substr(cut_front, name.size() - cut_front - cut_back));
+        }
+        return count;
+    };
+    if (known(0, 0) > 0) return;
+    const std::string& first = structures.front().entry.name;
+    std::size_t front = first.size(), back = first.size();
+    for (const Structure& s : structures) {
+        const std::string& name = s.entry.name;
+        const auto [a, b] = std::mismatch(first.begin(), first.end(), name.begin(), name.end());
+        front = std::min(front, static_cast<std::size_t>(a - first.begin()));
+        const auto [c, d] = std::mismatch(first.rbegin(), first.rend(), name.rbegin(), name.rend());
+        back = std::min(back, static_cast<std::size_t>(c - first.rbegin()));
+    }
+    const auto parts = [](char c) { return c == '_' || c == '-' || c == ' ' || c == '.'; };
+    std::vector<std::size_t> fronts{0}, backs{0};
+    for (std::size_t n = 0; n < front; ++n)
+        if (parts(first[n])) fronts.push_back(n + 1);
+    for (std::size_t n = 0; n < back; ++n)
+        if (parts(first[first.size() - 1 - n])) backs.push_back(n + 1);
+    std::size_t best = structures.size() / 2 + 1, cut_front = 0, cut_back = 0;
+    for (const std::size_t f : fronts)
+        for (const std::size_t b : backs)
+            if (const std::size_t count = known(f, b); count >= best) {
+                best = count;
+                cut_front = f;
+                cut_back = b;
+            }
+    if (cut_front + cut_back == 0) return;
+    notes.push_back({"names", "those of the files without '" + first.substr(0, cut_front) +
+                                  (cut_front > 0 && cut_back > 0 ? "' and '" : "") +
+                                  first.substr(first.size() - cut_back) + "'"});
+    for (Structure& s : structures)
+        s.entry.name = s.entry.name.substr(cut_front, s.entry.name.size() - cut_front - cut_back);
+}
+
 // Reads a folder of binary masks; every value other than 0 is inside.
 Result<StructureList> read_mask_folder(const std::string& folder, const ImportOptions& options) {
     std::vector<std::string> files;
@@ -518,11 +606,7 @@ Result<StructureList> read_mask_folder(const std::string& folder, const ImportOp
     std::set<std::string> told;
     for (const std::string& path : files) {
         SONOCASE_TRY(auto mask, read_label_layers(path, options.reading));
-        if (mask.layers.size() != 1 || mask.values.size() > 2)
-            return Error{
-                "mask holds " + std::to_string(mask.values.size()) + " different values", path,
-                "expected 0 and one other value in each file of the folder; give a label map "
-                "by its own path"};
+        SONOCASE_TRY_DONE(check_mask(mask, path));
         if (places.empty()) first_grid = mask.grid;
         SONOCASE_TRY_DONE(check_size(mask.grid, path));
         const auto offset = place_on_lattice(first_grid, mask.grid);
@@ -537,16 +621,32 @@ Result<StructureList> read_mask_folder(const std::string& folder, const ImportOp
         Structure structure;
         structure.entry.name = volume_stem(path);
         mend_name(structure.entry.name, list.warnings);
-        for (const LabelTableEntry& entry : table)
-            if (entry.name == structure.entry.name) structure.entry = entry;
-        if (structure.entry.value == 0)
-            structure.entry.value = totalsegmentator_value(structure.entry.name);
+        // A file of 3D Slicer with one segment may have its name inside.
+        if (!is_known_structure(structure.entry.name))
+            if (const auto segments = segments_of_fields(mask.fields, path);
+                segments && segments->size() == 1)
+                structure.entry.name = segments->front().name;
         for (std::size_t place = 0; place < mask.values.size(); ++place)
             if (mask.values[place] != 0)
                 append_runs(mask.layers[0], static_cast<std::uint8_t>(place), structure);
         list.structures.push_back(std::move(structure));
     }
+    leave_out_common_parts(list.structures, list.notes);
+    for (std::size_t n = 0; n < files.size(); ++n) {
+        LabelTableEntry& own = list.structures[n].entry;
+        for (const LabelTableEntry& entry : table)
+            if (entry.name == own.name) own = entry;
+        if (own.value == 0) own.value = totalsegmentator_value(own.name);
+        for (std::size_t m = 0; m < n; ++m)
+            if (list.structures[m].entry.name == own.name)
+                return Error{"two masks are named '" + own.name +
+                                 "': " + fs::path(files[m]).filename().string() + " and " +
+                                 fs::path(files[n]).filename().string(),
+                             folder,
+                             "keep one of them in the folder, or give it a name of its own"};
+    }
     SONOCASE_TRY_DONE(join_masks(first_grid, places, folder, list));
+    leave_out_background(list);
     // Names that TotalSegmentator does not define get values above its own.
     int next = 1001;
     for (Structure& structure : list.structures)
@@ -650,6 +750,7 @@ int fill_palette(const std::vector<Structure>& structures,
 struct PaintCount {
     std::uint64_t overlaps = 0;  // voxels of more than one structure
     std::uint64_t body_voxels = 0;
+    std::string covered;  // names of structures of which nothing is left
 };
 
 // Writes the structures' runs into the volume; where they overlap the smaller structure remains.
@@ -673,6 +774,12 @@ PaintCount paint(const std::vector<Structure>& structures, LabelVolume& labels) 
             }
         }
     }
+    if (count.overlaps == 0) return count;
+    std::vector<bool> left(256, false);
+    for (const std::uint8_t voxel : labels.voxels) left[voxel] = true;
+    for (std::size_t s = 0; s < structures.size(); ++s)
+        if (!left[s + 1])
+            count.covered += (count.covered.empty() ? "" : ", ") + structures[s].entry.name;
     return count;
 }
 
@@ -746,6 +853,9 @@ Result<ImportedLabels> import_label_map(const std::string& path,
     const std::string& table = options.table.empty() ? path : options.table;
     SONOCASE_TRY_DONE(check_classes(structures, table));
 
+    if (std::min({list.grid.size.x, list.grid.size.y, list.grid.size.z}) < 2)
+        return Error{"a single slice of " + grid_text(list.grid) + " voxels", path,
+                     "expected a volume: give the whole map, or the folder of all its slices"};
     report_progress(progress, 0.6, "painting labels");
     LabelVolume& labels = result.labels;
     labels.grid = list.grid;
@@ -760,6 +870,10 @@ Result<ImportedLabels> import_label_map(const std::string& path,
         report.warnings.push_back(
             std::to_string(painted.overlaps) +
             " voxels lie in more than one structure and went to the smaller one");
+    if (!painted.covered.empty())
+        report.warnings.push_back(
+            "smaller structures cover these wholly, so that nothing is left of them: " +
+            painted.covered + "; are they drawn twice, or are masks turned inside out (0 inside)?");
     const Box3 box = body_box(labels);
     if (const auto error = check_torso_extent(box.extent(), "body", path, "--scale")) return *error;
 

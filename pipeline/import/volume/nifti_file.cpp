@@ -398,6 +398,19 @@ Result<NiftiHeader> parse_nifti_header(std::span<const std::uint8_t> bytes,
         return Error{what, path,
                      "expected NIfTI-1 or NIfTI-2 in a single file; copy or export it again"};
     };
+    for (const auto& [sign, kind, advice] :
+         {std::tuple<std::string_view, const char*, const char*>{
+              "\x1f\x8b", "packed with gzip twice", "unpack it once (gunzip), and give that file"},
+          {"BZh", "packed with bzip2", "unpack it (bunzip2), and give the .nii"},
+          {"\xfd"
+           "7zXZ",
+           "packed with xz", "unpack it (unxz), and give the .nii"},
+          {"\x28\xb5\x2f\xfd", "packed with zstd", "unpack it (unzstd), and give the .nii"},
+          {"NRRD0", "an NRRD file", "give it a name that ends in .nrrd"}})
+        if (bytes.size() >= sign.size() &&
+            std::equal(sign.begin(), sign.end(), bytes.begin(),
+                       [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; }))
+            return Error{std::string("is no NIfTI file: it is ") + kind, path, advice};
     if (bytes.size() < 4) return no_header("file has no header");
     NiftiHeader header;
     header.bytes = int_at(bytes.data(), false);
@@ -450,8 +463,11 @@ Result<NativeVolume> read_nifti_volume(const std::string& path, const VolumeRead
     const GzFile file(gzopen(path.c_str(), "rb"));
     if (!file) return Error{"cannot open", path, "check that it may be read"};
     gzbuffer(file.get(), 1 << 18);
-    SONOCASE_TRY(const auto header,
-                 parse_nifti_header(first_bytes(file.get()), path, reading.orientation));
+    const std::vector<std::uint8_t> head = first_bytes(file.get());
+    if (int status = Z_OK;
+        head.empty() && gzerror(file.get(), &status) != nullptr && status == Z_DATA_ERROR)
+        return Error{"damaged compression", path, kCutOff};
+    SONOCASE_TRY(const auto header, parse_nifti_header(head, path, reading.orientation));
     NativeVolume volume;
     SONOCASE_TRY_DONE(place_volume(header.placement, reading, path, volume));
     volume.component = header.component;

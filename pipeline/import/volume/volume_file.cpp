@@ -80,11 +80,13 @@ Result<NativeVolume> read_native(const std::string& path, const VolumeReading& r
     }
     SONOCASE_TRY_DONE(check_source_file(path, "expected a volume file"));
     if (is_dicom_file(path)) return read_dicom(path, reading.resample_shear);
-    if (!is_volume_file_name(path))
+    if (!is_volume_file_name(path)) {
+        if (auto foreign = foreign_format(path)) return *std::move(foreign);
         return Error{
             "not a known volume file name", path,
             "expected .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, a DICOM segmentation, a folder of "
             "masks or of DICOM files"};
+    }
     if (is_nifti_name(path)) return read_nifti_volume(path, reading);
     return read_itk_volume(path, reading);
 }
@@ -307,7 +309,7 @@ Result<LabelLayers> read_label_layers(const std::string& path, const VolumeReadi
         }
     });
     if (verdict == kNotWhole && !std::isfinite(not_whole))
-        return Error{"voxels hold values that are no numbers (NaN)", path,
+        return Error{"a voxel's value is not a number (NaN)", path,
                      "expected a label map with 0 outside: write 0 in their place (fslmaths IN "
                      "-nan OUT)"};
     if (verdict == kNotWhole && std::abs(not_whole) > 2e9)

@@ -33,6 +33,27 @@ bool names_many_files(const std::string& data_file) {
     return data_file.find('%') != std::string::npos || lower_case(data_file).starts_with("list");
 }
 
+// The number in "%03d" or "%d", with what stands before and after it; nothing for other patterns,
+// which the library would hand to printf.
+struct NumberedName {
+    std::string before, after;
+    std::size_t width = 0;
+    bool zeros = false;
+};
+std::optional<NumberedName> numbered_name(const std::string& pattern) {
+    const std::size_t sign = pattern.find('%');
+    if (sign == std::string::npos || pattern.find('%', sign + 1) != std::string::npos)
+        return std::nullopt;
+    std::size_t at = sign + 1;
+    NumberedName name{pattern.substr(0, sign), {}, 0, false};
+    name.zeros = at < pattern.size() && pattern[at] == '0';
+    while (at < pattern.size() && pattern[at] >= '0' && pattern[at] <= '9' && name.width < 100)
+        name.width = 10 * name.width + static_cast<std::size_t>(pattern[at++] - '0');
+    if (at >= pattern.size() || pattern[at] != 'd' || name.width > 20) return std::nullopt;
+    name.after = pattern.substr(at + 1);
+    return name;
+}
+
 std::string beside(const std::string& path, const std::string& data_file) {
     return (fs::path(path).parent_path() / data_file).string();
 }
@@ -57,6 +78,60 @@ std::string nrrd_data_file(const std::string& path) {
     return {};
 }
 
+// The files of voxels that a header names one by one ("LIST", with a name in each line that
+// follows) or by a pattern ("slice%03d.raw 1 48 1"), in order.
+Result<std::vector<std::string>> listed_files(const std::string& path,
+                                              const std::string& data_file) {
+    std::vector<std::string> files;
+    if (lower_case(data_file).starts_with("list")) {
+        std::ifstream file(path, std::ios::binary);
+        std::string line;
+        bool listed = false;
+        for (int n = 0; n < kMaxHeaderLines + 65535 && std::getline(file, line); ++n) {
+            line = std::string(trimmed(line));
+            if (listed && !line.empty()) files.push_back(beside(path, line));
+            listed = listed || line.ends_with(data_file);
+        }
+        return files;
+    }
+    std::vector<std::string> words;
+    for (std::string_view rest = data_file; !(rest = trimmed(rest)).empty();) {
+        const std::size_t end = std::min(rest.find_first_of(" \t"), rest.size());
+        words.emplace_back(rest.substr(0, end));
+        rest.remove_prefix(end);
+    }
+    const auto name = words.empty() ? std::nullopt : numbered_name(words[0]);
+    const Error unknown{"the pattern of its data files '" + data_file.substr(0, 60) + "' is none",
+                        path, "expected one such as slice%03d.raw 1 48 1: first, last and step"};
+    if (!name || words.size() < 3) return unknown;
+    const auto first = number_in(words[1]), last = number_in(words[2]),
+               step = number_in(words.size() > 3 ? words[3] : "1");
+    const auto whole = [](const std::optional<double>& n) {
+        return n && std::abs(*n) <= 1e6 && *n == std::floor(*n);
+    };
+    if (!whole(first) || !whole(last) || !whole(step) || !(*step > 0) || *first < 0) return unknown;
+    for (double n = *first; n <= *last && files.size() <= 65535; n += *step) {
+        std::string number = std::to_string(static_cast<long>(n));
+        if (number.size() < name->width)
+            number.insert(0, name->width - number.size(), name->zeros ? '0' : ' ');
+        files.push_back(beside(path, name->before + number + name->after));
+    }
+    return files;
+}
+
+// Every file of the list is there: the library below leaves out what is not, without a word.
+Status check_listed_files(const std::string& path, const std::string& data_file) {
+    SONOCASE_TRY_DONE(check_source_folder(folder_of(path), kExpected));
+    SONOCASE_TRY(const auto files, listed_files(path, data_file));
+    std::error_code code;
+    for (const std::string& file : files)
+        if (!fs::exists(file, code))
+            return Error{
+                "its data file " + file + " is not there, one of " + std::to_string(files.size()),
+                path, "keep them together, or name those that there are"};
+    return Done{};
+}
+
 Status check_data_file(const std::string& path, const std::string& data_path) {
     std::error_code code;
     if (!fs::exists(data_path, code))
@@ -79,36 +154,28 @@ MetaHeader read_meta_header(const std::string& path) {
         const std::string value(trimmed(line.substr(equals + 1)));
         if (key == "elementdatafile") data_file = value;
         if (key == "compresseddata") header.compressed = lower_case(value) == "true";
-        if (key == "headersize")
-            skip = static_cast<std::uint64_t>(std::max(0.0, number_in(value).value_or(0)));
+        if (key == "compresseddatasize")
+            header.compressed_bytes =
+                static_cast<std::uint64_t>(std::clamp(number_in(value).value_or(0), 0.0, 1e15));
+        if (key == "headersize") {
+            const double bytes = number_in(value).value_or(0);
+            skip = static_cast<std::uint64_t>(std::clamp(bytes, 0.0, 1e15));
+            header.voxels_from_end = bytes < 0;
+        }
+        if (key == "binarydata") header.is_binary = lower_case(value) != "false";
     }
     if (lower_case(data_file) == "local") {
         header.data_path = path;
         header.voxels_at = static_cast<std::uint64_t>(file.tellg());
     } else if (names_many_files(data_file)) {
         header.many_files = true;
+        header.data_files = data_file;
+        header.voxels_at = skip;
     } else if (!data_file.empty()) {
         header.data_path = beside(path, data_file);
         header.voxels_at = skip;
     }
     return header;
-}
-
-Status check_data_files(const std::string& path) {
-    if (has_ending(path, ".mha") || has_ending(path, ".mhd")) {
-        const MetaHeader header = read_meta_header(path);
-        if (header.many_files) return check_source_folder(folder_of(path), kExpected);
-        // A header that is cut off names no file: the reader reports it.
-        if (header.data_path.empty() || header.data_path == path) return Done{};
-        return check_data_file(path, header.data_path);
-    }
-    if (has_ending(path, ".nrrd") || has_ending(path, ".nhdr")) {
-        const std::string data_file = nrrd_data_file(path);
-        if (data_file.empty()) return Done{};
-        if (names_many_files(data_file)) return check_source_folder(folder_of(path), kExpected);
-        return check_data_file(path, beside(path, data_file));
-    }
-    return Done{};
 }
 
 namespace {
@@ -147,49 +214,6 @@ std::uint64_t inflated_bytes(const std::vector<std::uint8_t>& packed,
 }
 
 }  // namespace
-
-Status check_meta_length(const std::string& path, std::uint64_t voxel_bytes) {
-    if (!has_ending(path, ".mha") && !has_ending(path, ".mhd")) return Done{};
-    const MetaHeader header = read_meta_header(path);
-    if (header.many_files) return Done{};  // one file per slice: the reader misses absent ones
-    std::error_code code;
-    const std::uint64_t size = fs::file_size(header.data_path, code);
-    if (code)
-        return Error{"its data file " + header.data_path + " is not there", path,
-                     "keep the two together"};
-    if (!header.compressed) {
-        if (size >= header.voxels_at + voxel_bytes) return Done{};
-        return cut_off(size > header.voxels_at ? size - header.voxels_at : 0, voxel_bytes, path);
-    }
-    SONOCASE_TRY(const auto packed, read_file(header.data_path));
-    const std::uint64_t found =
-        inflated_bytes(packed, std::min<std::size_t>(header.voxels_at, packed.size()), voxel_bytes);
-    if (found < voxel_bytes) return cut_off(found, voxel_bytes, path);
-    return Done{};
-}
-
-Status check_nrrd_length(const std::string& path, std::uint64_t voxel_bytes) {
-    if (!has_ending(path, ".nrrd")) return Done{};
-    SONOCASE_TRY(const auto bytes, read_file(path));
-    // Lines up to an empty one; "data file" means that the voxels are elsewhere.
-    bool gzip = false;
-    for (std::size_t at = 0; at < bytes.size();) {
-        const auto end = std::find(bytes.begin() + static_cast<std::ptrdiff_t>(at), bytes.end(),
-                                   std::uint8_t{'\n'});
-        std::string line(bytes.begin() + static_cast<std::ptrdiff_t>(at), end);
-        at = static_cast<std::size_t>(end - bytes.begin()) + 1;
-        if (!line.empty() && line.back() == '\r') line.pop_back();
-        const std::string lower = lower_case(line);
-        if (lower.starts_with("data file:") || lower.starts_with("datafile:")) return Done{};
-        if (lower == "encoding: gzip" || lower == "encoding: gz") gzip = true;
-        if (!line.empty()) continue;
-        if (!gzip) return Done{};  // the reader counts raw bytes itself
-        const std::uint64_t found = inflated_bytes(bytes, std::min(at, bytes.size()), voxel_bytes);
-        if (found < voxel_bytes) return cut_off(found, voxel_bytes, path);
-        return Done{};
-    }
-    return Done{};
-}
 
 namespace {
 
@@ -281,6 +305,11 @@ const char* kNoOrientation =
     "the file does not say how its axes lie in the patient (%s), so right and left may be "
     "exchanged: its axes are taken to run to the left, to the back and to the head; check on which "
     "side the liver is, or export the file again with its orientation";
+
+const char* kNoOrigin =
+    "the header gives no origin (%s): the first voxel is taken to lie at 0, so that points given "
+    "in "
+    "the scan's coordinates do not fit; write the file again with its origin";
 
 // "(1,0,0) none (0,1,0)": an empty vector for "none".
 std::vector<std::vector<std::string>> vectors_in(std::string_view text) {
@@ -439,6 +468,23 @@ Result<Placement> nrrd_placement(std::string_view header, const std::string& pat
         sign[1] = 1;
     } else if (space != "left-posterior-superior" && space != "lps") {
         known_space = false;
+        constexpr std::string_view kNamed[] = {"",
+                                               "scanner-xyz",
+                                               "3d-right-handed",
+                                               "3d-left-handed",
+                                               "scanner-xyz-time",
+                                               "3d-right-handed-time",
+                                               "3d-left-handed-time",
+                                               "right-anterior-superior-time",
+                                               "left-anterior-superior-time",
+                                               "left-posterior-superior-time",
+                                               "rast",
+                                               "last",
+                                               "lpst"};
+        if (std::find(std::begin(kNamed), std::end(kNamed), space) == std::end(kNamed))
+            return Error{"the space '" + field("space").substr(0, 40) + "' is none of NRRD's", path,
+                         "expected left-posterior-superior, right-anterior-superior or "
+                         "left-anterior-superior: write the volume again in one of them"};
     }
     if (!vectors.empty()) {
         for (std::size_t n = 0; n < 3; ++n) {
@@ -453,6 +499,8 @@ Result<Placement> nrrd_placement(std::string_view header, const std::string& pat
             SONOCASE_TRY(const auto origin, finite_numbers(origins[0], 3, "space origin", path));
             for (int row = 0; row < 3; ++row)
                 placement.origin_mm[row] = sign[row] * origin[static_cast<std::size_t>(row)];
+        } else {
+            placement.warnings.push_back(text(kNoOrigin, "space origin"));
         }
         if (!known_space)
             placement.warnings.push_back(
@@ -576,6 +624,8 @@ Result<Placement> meta_placement(std::string_view header, const std::string& pat
     }
     if (!origin_name.empty()) {
         SONOCASE_TRY(origin, finite_numbers(words_of(origin_text), dimensions, origin_name, path));
+    } else {
+        placement.warnings.push_back(text(kNoOrigin, "Offset"));
     }
     if (!matrix_name.empty()) {
         SONOCASE_TRY(matrix, finite_numbers(words_of(matrix_text), dimensions * dimensions,
@@ -649,10 +699,146 @@ std::string header_text(const std::string& path) {
     return header;
 }
 
-Result<Placement> placement_in_header(const std::string& path) {
-    const bool meta = has_ending(path, ".mha") || has_ending(path, ".mhd");
+namespace {
+
+// Without a number of dimensions behind "LIST" or the pattern each file of an NRRD is one slice.
+Status check_slice_count(const std::string& path, const std::string& data_file) {
+    SONOCASE_TRY(const auto files, listed_files(path, data_file));
+    const std::size_t words = words_of(data_file).size();
+    if (words != (lower_case(data_file).starts_with("list") ? 1u : 4u)) return Done{};
+    const auto fields = nrrd_fields(header_text(path));
+    const auto sizes = fields.find("sizes");
+    const std::vector<std::string> cells =
+        sizes == fields.end() ? std::vector<std::string>{} : words_of(sizes->second);
+    const auto slices = cells.empty() ? std::nullopt : number_in(cells.back());
+    if (!slices || *slices == static_cast<double>(files.size())) return Done{};
+    return Error{"names " + std::to_string(files.size()) +
+                     " data files where its header asks for " + cells.back() + " slices",
+                 path, "name one file for each slice"};
+}
+
+}  // namespace
+
+Status check_data_files(const std::string& path) {
+    if (has_ending(path, ".mha") || has_ending(path, ".mhd")) {
+        const MetaHeader header = read_meta_header(path);
+        if (header.many_files) return check_listed_files(path, header.data_files);
+        // A header that is cut off names no file: the reader reports it.
+        if (header.data_path.empty() || header.data_path == path) return Done{};
+        return check_data_file(path, header.data_path);
+    }
+    if (has_ending(path, ".nrrd") || has_ending(path, ".nhdr")) {
+        const std::string data_file = nrrd_data_file(path);
+        if (data_file.empty()) return Done{};
+        if (names_many_files(data_file)) {
+            SONOCASE_TRY_DONE(check_listed_files(path, data_file));
+            return check_slice_count(path, data_file);
+        }
+        return check_data_file(path, beside(path, data_file));
+    }
+    return Done{};
+}
+
+namespace {
+
+// Voxels that are stored as they are, in files that hold `found` bytes of them.
+Status check_plain_length(std::uint64_t found,
+                          std::uint64_t needed,
+                          const std::string& path,
+                          std::vector<std::string>& warnings) {
+    if (found < needed) return cut_off(found, needed, path);
+    constexpr std::uint64_t kLineEnds = 16;
+    if (found > needed + kLineEnds)
+        warnings.push_back(
+            "the file holds " + std::to_string(found - needed) +
+            " bytes more than its header asks for: the voxels are taken from the beginning; if "
+            "they are the last bytes, behind a header of another program, say so (HeaderSize = -1 "
+            "in MetaImage, byte skip: -1 in NRRD), and check the type of the voxels");
+    return Done{};
+}
+
+Result<std::uint64_t> bytes_of_files(const std::string& path, const std::string& data_file) {
+    SONOCASE_TRY(const auto files, listed_files(path, data_file));
+    std::uint64_t bytes = 0;
+    for (const std::string& file : files) {
+        std::error_code code;
+        const std::uint64_t size = fs::file_size(file, code);
+        bytes += code ? 0 : size;
+    }
+    return bytes;
+}
+
+}  // namespace
+
+Status check_meta_length(const std::string& path,
+                         std::uint64_t voxel_bytes,
+                         std::vector<std::string>& warnings) {
+    if (!has_ending(path, ".mha") && !has_ending(path, ".mhd")) return Done{};
+    const MetaHeader header = read_meta_header(path);
+    if (header.many_files) {
+        if (header.compressed || header.voxels_from_end || header.voxels_at > 0) return Done{};
+        SONOCASE_TRY(const auto bytes, bytes_of_files(path, header.data_files));
+        return check_plain_length(bytes, voxel_bytes, path, warnings);
+    }
+    std::error_code code;
+    const std::uint64_t size = fs::file_size(header.data_path, code);
+    if (code)
+        return Error{"its data file " + header.data_path + " is not there", path,
+                     "keep the two together"};
+    const std::uint64_t there = size > header.voxels_at ? size - header.voxels_at : 0;
+    if (!header.compressed) {
+        if (!header.is_binary || (header.voxels_from_end && there >= voxel_bytes)) return Done{};
+        return check_plain_length(there, voxel_bytes, path, warnings);
+    }
+    SONOCASE_TRY(auto packed, read_file(header.data_path));
+    // The library reads as many as are stated.
+    if (header.compressed_bytes > 0 && header.compressed_bytes < there)
+        packed.resize(header.voxels_at + header.compressed_bytes);
+    const std::uint64_t found =
+        inflated_bytes(packed, std::min<std::size_t>(header.voxels_at, packed.size()), voxel_bytes);
+    if (found < voxel_bytes && packed.size() < size)
+        return Error{"CompressedDataSize of the header is " +
+                         std::to_string(header.compressed_bytes) + ", and " +
+                         std::to_string(there) + " bytes follow",
+                     path, "export it again"};
+    if (found < voxel_bytes) return cut_off(found, voxel_bytes, path);
+    return Done{};
+}
+
+Status check_nrrd_length(const std::string& path,
+                         std::uint64_t voxel_bytes,
+                         std::vector<std::string>& warnings) {
+    if (!has_ending(path, ".nrrd") && !has_ending(path, ".nhdr")) return Done{};
     const std::string header = header_text(path);
-    return meta ? meta_placement(header, path) : nrrd_placement(header, path);
+    const auto fields = nrrd_fields(header);
+    const auto field = [&](const char* key) {
+        const auto found = fields.find(key);
+        return found == fields.end() ? std::string() : lower_case(found->second);
+    };
+    const bool gzip = field("encoding") == "gzip" || field("encoding") == "gz";
+    if (!gzip && field("encoding") != "raw") return Done{};
+    const double skipped = number_in(field("byteskip")).value_or(0);
+    if (number_in(field("lineskip")).value_or(0) != 0 || skipped < 0) return Done{};
+    const std::string data_file = nrrd_data_file(path);
+    if (names_many_files(data_file)) {
+        if (gzip || skipped > 0) return Done{};
+        SONOCASE_TRY(const auto bytes, bytes_of_files(path, data_file));
+        return check_plain_length(bytes, voxel_bytes, path, warnings);
+    }
+    const std::string data_path = data_file.empty() ? path : beside(path, data_file);
+    const std::size_t at = data_file.empty() ? header.size() : 0;
+    if (gzip) {
+        if (skipped > 0) return Done{};
+        SONOCASE_TRY(const auto bytes, read_file(data_path));
+        const std::uint64_t found = inflated_bytes(bytes, std::min(at, bytes.size()), voxel_bytes);
+        if (found < voxel_bytes) return cut_off(found, voxel_bytes, path);
+        return Done{};
+    }
+    std::error_code code;
+    const std::uint64_t size = fs::file_size(data_path, code);
+    const std::uint64_t before = at + static_cast<std::uint64_t>(std::min(skipped, 1e15));
+    if (code) return Done{};  // the reader says why
+    return check_plain_length(size > before ? size - before : 0, voxel_bytes, path, warnings);
 }
 
 namespace {
@@ -693,6 +879,36 @@ std::optional<Component> component_named(std::string type) {
         if (name == type) return component;
     return std::nullopt;
 }
+
+}  // namespace
+
+Status check_nrrd_encoding(std::string_view header, const std::string& path) {
+    const auto fields = nrrd_fields(header);
+    const auto field = [&](const char* key) {
+        const auto found = fields.find(key);
+        return found == fields.end() ? std::string() : lower_case(found->second);
+    };
+    const std::size_t axes = words_of(field("sizes")).size();
+    if (axes > 4)
+        return Error{"volume of " + std::to_string(axes) + " axes", path,
+                     "expected three of space, and one of layers at most"};
+    const auto component = component_named(field("type"));
+    const std::string encoding = field("encoding");
+    const bool as_text = encoding == "ascii" || encoding == "text" || encoding == "txt";
+    if (component && bytes_of(*component) > 1 && !as_text && field("endian").empty())
+        return Error{"the header does not say in which order the bytes of its voxels are (endian)",
+                     path,
+                     "give it the line 'endian: little', as nearly all programs write, or big"};
+    return Done{};
+}
+
+Result<Placement> placement_in_header(const std::string& path) {
+    const bool meta = has_ending(path, ".mha") || has_ending(path, ".mhd");
+    const std::string header = header_text(path);
+    return meta ? meta_placement(header, path) : nrrd_placement(header, path);
+}
+
+namespace {
 
 // A value of the writer's own, in which "\\n" stands for the end of a line.
 std::string without_escapes(std::string_view text) {

@@ -19,10 +19,14 @@ namespace sonocase::pipeline::inline import_volume {
 
 // What a MetaImage header (.mha, .mhd) says about its voxels.
 struct MetaHeader {
-    std::string data_path;        // the header's own path if the voxels follow it; may be empty
-    std::uint64_t voxels_at = 0;  // bytes to skip in that file
+    std::string data_path;         // the header's own path if the voxels follow it; may be empty
+    std::uint64_t voxels_at = 0;   // bytes to skip in that file
+    bool voxels_from_end = false;  // they are the last bytes of that file
+    bool is_binary = true;
     bool compressed = false;
-    bool many_files = false;  // a list or a numbered pattern; data_path is then empty
+    std::uint64_t compressed_bytes = 0;  // as stated; 0: up to the end of the file
+    bool many_files = false;             // data_path is then empty
+    std::string data_files;              // "LIST", or a numbered pattern
 };
 MetaHeader read_meta_header(const std::string& path);
 
@@ -39,6 +43,9 @@ Result<Placement> nrrd_placement(std::string_view header, const std::string& pat
 Result<Placement> meta_placement(std::string_view header, const std::string& path);
 // Of a file whose name ends in .nrrd, .nhdr, .mha or .mhd.
 Result<Placement> placement_in_header(const std::string& path);
+
+// An Error where the library below ITK would refuse an NRRD file without saying why.
+Status check_nrrd_encoding(std::string_view header, const std::string& path);
 
 // What an NRRD header says of its voxels besides their place, for encodings that the library below
 // ITK was built without (bzip2).
@@ -62,10 +69,15 @@ Result<std::vector<std::byte>> unpack_bzip2(std::span<const std::uint8_t> file,
                                             std::uint64_t count,
                                             const std::string& path);
 
-// An Error if the file holds fewer than `voxel_bytes` after its header, or is damaged gzip; Done
-// for files of another format. The library below ITK does not notice in a compressed NRRD file that
+// An Error if the file, or all that it names together, hold fewer than `voxel_bytes` after the
+// header, or damaged gzip; a warning where they hold more that are not packed; Done for files of
+// another format. The library below ITK does not notice in a compressed NRRD file that
 // the end of the stream is missing.
-Status check_meta_length(const std::string& path, std::uint64_t voxel_bytes);
-Status check_nrrd_length(const std::string& path, std::uint64_t voxel_bytes);  // if compressed
+Status check_meta_length(const std::string& path,
+                         std::uint64_t voxel_bytes,
+                         std::vector<std::string>& warnings);
+Status check_nrrd_length(const std::string& path,
+                         std::uint64_t voxel_bytes,
+                         std::vector<std::string>& warnings);
 
 }  // namespace sonocase::pipeline::inline import_volume

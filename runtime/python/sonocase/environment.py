@@ -21,7 +21,7 @@ Tasks, and their actions (numbers from -1 to 1, each a part of the greatest step
                   and shift along the probe's face. Bring the tip to the target.
 
 The observation is the picture: uint8 (height, width). `info` holds `contact` (share of beams that
-touch the skin), `facts` (Renderer.truth, None where that has NaN, which is not equal to itself) and,
+touch the skin), `facts` (Renderer.truth, without what is NaN or None in a frame, but for `tip`) and,
 where asked for, `planes`.
 """
 
@@ -71,12 +71,19 @@ class Box:
         return x.shape == self.shape and bool(np.all((x >= self.low) & (x <= self.high)))
 
 
+def _is_nan(fact):
+    return isinstance(fact, float) and fact != fact
+
+
 def _comparable(fact):
+    """Facts that are equal when they repeat, and that Gymnasium can put side by side for several environments: it gives a
+    number an array of numbers, which cannot hold the None of an environment that lacks it. What is not known is left out."""
     if isinstance(fact, dict):
-        return {name: _comparable(value) for name, value in fact.items()}
+        return {name: _comparable(value) for name, value in fact.items()
+                if not _is_nan(value) and (value is not None or name == "tip")}
     if isinstance(fact, list):
-        return [_comparable(value) for value in fact]
-    return None if isinstance(fact, float) and fact != fact else fact
+        return [None if _is_nan(value) else _comparable(value) for value in fact]
+    return fact
 
 
 def _box(low, high, shape, dtype):

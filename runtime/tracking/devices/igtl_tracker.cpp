@@ -18,7 +18,7 @@ namespace {
 constexpr double kNearMm = 10;  // no tracker measures a probe for long so near to its own origin
 constexpr int kSlowPoses = 5;
 // A sender of 250 readings a second of four tools takes half a hundredth of a core.
-constexpr double kMostOfACore = 0.1;
+constexpr double kMaxShareOfACore = 0.1;
 constexpr double kWakeEveryS = 0.002;
 
 double thread_seconds() {
@@ -86,13 +86,13 @@ void IgtlTracker::pay() {
     const double now_s = clock_(), spent_s = thread_seconds();
     constexpr double kSavedS = 0.02;
     if (paid_s_ >= 0) {
-        credit_s_ = std::min(credit_s_ + kMostOfACore * (now_s - paid_s_), kSavedS);
+        credit_s_ = std::min(credit_s_ + kMaxShareOfACore * (now_s - paid_s_), kSavedS);
         credit_s_ -= spent_s - spent_before_s_;
     }
     paid_s_ = now_s;
     spent_before_s_ = spent_s;
     if (credit_s_ >= 0) return;
-    const double rest_s = std::min(-credit_s_ / kMostOfACore, 0.05);
+    const double rest_s = std::min(-credit_s_ / kMaxShareOfACore, 0.05);
     std::this_thread::sleep_for(std::chrono::duration<double>(rest_s));
 }
 
@@ -307,7 +307,7 @@ Message IgtlTracker::what_came(double now_s) const {
             "ImageTo..., or say --tool probe={}.",
             {count(heard_.poses[most]), names_[most], names_[most]}};
     if (heard_.not_finite > 0)
-        return {"{} transforms came that hold no numbers (NaN); check the sender.",
+        return {"{} transforms came with an entry that is not a number (NaN); check the sender.",
                 {count(heard_.not_finite)}};
     if (heard_.poses[kNeedleSensor] > 0)
         return {

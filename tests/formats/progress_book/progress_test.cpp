@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <csignal>
+#include <cstdarg>
 #include <filesystem>
 
 #include "formats/files/atomic_file.h"
@@ -178,6 +181,38 @@ TEST(ProgressBook, AFileThatIsNoneIsRefusedAndLeftAlone) {
     ASSERT_FALSE(book);
     EXPECT_NE(book.error().message().find("a.sqlite"), std::string::npos);
     EXPECT_EQ(*read_text_file(path), text);
+}
+
+// What the file system says to every lock that is asked for.
+int refused_lock = 0;
+int (*true_fcntl)(int, int, ...) = nullptr;
+int fcntl_without_locks(int file, int command, ...) {
+    va_list more;
+    va_start(more, command);
+    void* argument = va_arg(more, void*);
+    va_end(more);
+    if (command != F_SETLK && command != F_GETLK) return true_fcntl(file, command, argument);
+    errno = refused_lock;
+    return -1;
+}
+
+TEST(ProgressBook, AFolderThatCannotLockIsNamed) {
+    sqlite3_vfs* vfs = sqlite3_vfs_find(nullptr);
+    ASSERT_NE(vfs->xGetSystemCall(vfs, "fcntl"), nullptr);
+    true_fcntl = reinterpret_cast<int (*)(int, int, ...)>(vfs->xGetSystemCall(vfs, "fcntl"));
+    testing::TemporaryFolder folder;
+    const std::string path = folder / "book.sqlite";
+    ASSERT_TRUE(ProgressBook::open(path));
+    vfs->xSetSystemCall(vfs, "fcntl", reinterpret_cast<sqlite3_syscall_ptr>(&fcntl_without_locks));
+    for (const int reason : {ESTALE, EOPNOTSUPP, EIO}) {
+        refused_lock = reason;
+        const auto book = ProgressBook::open(path);
+        ASSERT_FALSE(book) << reason;
+        EXPECT_NE(book.error().what.find("cannot lock files (a network home)"), std::string::npos)
+            << book.error().message();
+    }
+    vfs->xSetSystemCall(vfs, "fcntl", nullptr);
+    EXPECT_TRUE(ProgressBook::open(path));
 }
 
 }  // namespace

@@ -67,6 +67,20 @@ TEST(Poses, FaultsNameTheLine) {
     EXPECT_TRUE(parse_poses(kHeader, "p.csv")->empty());
 }
 
+TEST(Poses, ProbeAndNeedleAreTwoFilesInThisOrder) {
+    const testing::TemporaryFolder folder;
+    const std::string text = format_poses(testing::tool_poses(1, 0));
+    const std::string probe = folder.write("probe.csv", text),
+                      needle = folder.write("needle.csv", text);
+    EXPECT_TRUE(load_recording_file(probe + "," + needle));
+    const auto same = load_recording_file(probe + "," + probe);
+    ASSERT_FALSE(same);
+    EXPECT_EQ(same.error().what, "probe and needle are one file");
+    const auto swapped = load_recording_file(needle + "," + probe);
+    ASSERT_FALSE(swapped);
+    EXPECT_EQ(swapped.error().what, "the needle's file comes first by its name");
+}
+
 TEST(Poses, OneRecordingIsTheSameInEveryForm) {
     const std::vector<Pose> probe = testing::tool_poses(1, 0), needle = testing::tool_poses(2, 7);
     const testing::TemporaryFolder folder;

@@ -410,6 +410,47 @@ TEST(AnatomyCheck, OddBodiesAreAccepted) {
     }
 }
 
+// A map that was made coarser and kept its voxel size, and a child, have the same sizes.
+TEST(AnatomyCheck, ABodyOfUnusualSizeIsTold) {
+    const auto scaled = [](double factor) {
+        return check_anatomy(mapped(torso(), {0, 1, 2}, {1, 1, 1}, {factor, factor, factor}));
+    };
+    EXPECT_TRUE(scaled(1).size.empty()) << scaled(1).verdict();
+    EXPECT_TRUE(scaled(0.5).findings.empty()) << scaled(0.5).verdict();
+    EXPECT_NE(scaled(0.5).size.find("--scale"), std::string::npos) << scaled(0.5).verdict();
+    const AnatomyReport large = scaled(1.4);
+    EXPECT_FALSE(large.findings.empty() && large.size.empty());
+    LabelVolume labels = bodies().front().labels;
+    labels.grid.spacing_mm = 0.5 * labels.grid.spacing_mm;
+    StageReport report;
+    EXPECT_FALSE(report_anatomy(labels, {}, report));
+    ASSERT_EQ(report.warnings.size(), 1u);
+    EXPECT_NE(report.warnings[0].find("as large as an adult's"), std::string::npos);
+}
+
+TEST(AnatomyCheck, OneOrganThatLiesElsewhereIsNamed) {
+    for (const NamedBody& body : bodies())
+        for (const char* name : {"liver", "spleen", "kidney_right", "urinary_bladder"}) {
+            BodySummary moved = summarise_body(body.labels);
+            bool there = false;
+            double off_mm = 0;
+            for (LabelSummary& l : moved.labels) {
+                if (l.name != name || l.cut_low[2] || l.cut_high[2]) continue;
+                there = true;
+                const double middle = 0.5 * (moved.field.lower.x + moved.field.upper.x);
+                off_mm = 2 * std::abs(l.centre.x - middle);
+                l.centre.x = 2 * middle - l.centre.x;
+                if (l.name == "urinary_bladder") l.centre.z += off_mm = 250;
+            }
+            if (!there || off_mm < 110) continue;
+            const AnatomyReport report = check_anatomy(moved);
+            ASSERT_EQ(report.findings.size(), 1u) << body.name << " " << name;
+            EXPECT_NE(report.findings[0].text.find(name), std::string::npos)
+                << report.findings[0].text;
+            EXPECT_FALSE(report.findings[0].error);
+        }
+}
+
 TEST(AnatomyCheck, WhatIsNoTorsoIsNotChecked) {
     const auto phantom = analytic_body("flow-phantom");
     ASSERT_TRUE(phantom);

@@ -98,7 +98,18 @@ class Advice : public ::testing::Test {
 };
 
 TEST_F(Advice, OfFilesLeadsToFilesThatAreRead) {
-    expect("not a known volume file name", ".nii", map("map.img", good_), map("map.nii", good_));
+    expect("not a known volume file name", ".nii", map("map.vol", good_), map("map.nii", good_));
+    expect("an Analyze or NIfTI pair", ".nii.gz", map("map.img", good_),
+           map("map.nii.gz", testing::gzip_bytes(good_)));
+    expect("packed with gzip twice", "gunzip",
+           map("g.nii.gz", testing::gzip_bytes(testing::gzip_bytes(good_))),
+           map("g.nii.gz", testing::gzip_bytes(good_)));
+    expect("it is an NRRD file", ".nrrd", map("n.nii", testing::nrrd_bytes(volume_)),
+           map("n.nrrd", testing::nrrd_bytes(volume_)));
+    std::string damaged = testing::gzip_bytes(good_);
+    damaged[damaged.size() - 6] ^= 0x55;  // the checksum
+    expect("damaged compression", "copy or export it again", map("d.nii.gz", damaged),
+           map("d.nii.gz", testing::gzip_bytes(good_)));
     expect("file is empty", "export it again", map("e.nii", ""), map("e.nii", good_));
     expect("no such file", "check the path", at(folder_ / "mpa.nii"), at(folder_ / "map.nii"));
     expect("holds", "copy or export it again", map("c.nii", good_.substr(0, 900)),
@@ -137,7 +148,7 @@ TEST_F(Advice, OfVoxelsLeadsToLabels) {
         });
     };
     expect("such as 4.5", "a label map", map("f.nii", floats(4.5f)), map("f.nii", floats(4)));
-    expect("no numbers (NaN)", "write 0 in their place",
+    expect("is not a number (NaN)", "write 0 in their place",
            map("f.nii", floats(std::numeric_limits<float>::quiet_NaN())), map("f.nii", floats(0)));
     expect("as large as 3000000000", "number them anew", map("f.nii", floats(3e9f)),
            map("f.nii", floats(7)));
@@ -286,6 +297,20 @@ TEST_F(Advice, OfFoldersOfMasksLeadsToMasks) {
         folder_.write("m/spleen.nii", mask(kSpleen));
         return import_label_map(folder_ / "m");
     });
+    folder_.write("m/spleen.nii.gz", testing::gzip_bytes(mask(kSpleen)));
+    expect("two masks are named 'spleen': spleen.nii and spleen.nii.gz", "keep one of them",
+           at(folder_ / "m"), [&] {
+               std::filesystem::remove(folder_ / "m/spleen.nii.gz");
+               return import_label_map(folder_ / "m");
+           });
+    const auto lifted = testing::nifti_bytes(
+        testing::sample_in_order({0, 1, 2}, {false, false, false}, kExtent, kSpacing, kCorner,
+                                 [](Point3 p) { return shifted_body(p) == kSpleen ? 2 : 1; }));
+    folder_.write("m/spleen.nii", lifted);
+    expect("holds the values 1 and 2 and no 0", "write 0 in the place", at(folder_ / "m"), [&] {
+        folder_.write("m/spleen.nii", mask(kSpleen));
+        return import_label_map(folder_ / "m");
+    });
     // What macOS leaves in a folder beside each file is no mask, and no volume.
     folder_.write("m/._spleen.nii", "\x00\x05\x16\x07");
     EXPECT_TRUE(import_label_map(folder_ / "m"));
@@ -311,13 +336,18 @@ TEST_F(Advice, OfDicomLeadsToLabels) {
     contours.kind = "CT";
     contours.modality = "RTSTRUCT";
     folder_.write("rt/a.dcm", testing::dicom_object(volume_, contours));
+    TinyVolume scan = volume_;
+    for (std::size_t n = 0; n < scan.voxels.size(); ++n)
+        scan.voxels[n] = static_cast<std::uint8_t>(n * 37);
     for (int k = 0; k < volume_.size.z; ++k)
-        folder_.write("rt/s" + std::to_string(k), testing::dicom_slice(volume_, k, "1.2.3.5"));
+        folder_.write("rt/s" + std::to_string(k), testing::dicom_slice(scan, k, "1.2.3.5"));
     // Its slices are those of the scan: their values are no labels.
     expect("RTSTRUCT", "a DICOM segmentation or masks of it", at(folder_ / "rt"), [&] {
         folder_.write("rt/seg.dcm", testing::dicom_object(volume_, segmentation()));
         return import_label_map(folder_ / "rt");
     });
+    expect("the index of a disc (DICOMDIR)", "the folder of the series",
+           map("disc/DICOMDIR", std::string(128, '\0') + "DICM"), at(folder_ / "ct"));
     contours.modality = "PT";
     folder_.write("pet/a.dcm", testing::dicom_object(volume_, contours));
     expect("holds no labels: 1 PT", "a DICOM segmentation", at(folder_ / "pet"), [&] {

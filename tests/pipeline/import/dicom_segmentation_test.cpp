@@ -313,6 +313,16 @@ TEST_F(DicomSegmentation, OfContoursOrReportsIsRefusedByName) {
     object_.modality = "RTSTRUCT";
     expect_refused(import_label_map(write("rt/rtss.dcm")), "RTSTRUCT");
     expect_refused(import_label_map(folder_ / "rt"), "RTSTRUCT");
+    // Slices that are labels themselves are read beside it, as a file or in a folder of its own.
+    for (int k = 0; k < volume_.size.z; ++k)
+        folder_.write("rt/ct/s" + std::to_string(k), testing::dicom_slice(volume_, k, "1.2.3.5"));
+    const auto beside = import_label_map(folder_ / "rt");
+    ASSERT_TRUE(beside) << beside.error().message();
+    EXPECT_EQ(beside->labels.grid.size, volume_.size);
+    ASSERT_FALSE(beside->report.warnings.empty());
+    EXPECT_NE(beside->report.warnings[0].find("the contours of rtss.dcm (RTSTRUCT) are not read"),
+              std::string::npos)
+        << beside->report.warnings[0];
     object_.modality = "PT";
     write("pet/a.dcm");
     expect_refused(import_label_map(folder_ / "pet"), "1 PT (a.dcm)");

@@ -4,6 +4,7 @@
 // those of a numbering that sizes and places of the organs do not speak against.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -365,6 +366,85 @@ TEST_F(LabelNames, TextThatIsNotUtf8IsNamedOrTurned) {
     for (const char* bad :
          {"\xf6", "a\xc3", "\xc0\xaf", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xe2\x82", "\x80"})
         EXPECT_FALSE(is_utf8(bad));
+}
+
+std::string mask_of(int value, bool turned = false) {
+    return testing::nifti_bytes(testing::sample_in_order(
+        {0, 1, 2}, {false, false, false}, kExtent, kSpacing, kCorner,
+        [=](Point3 p) { return (shifted_body(p) == value) != turned ? 1 : 0; }));
+}
+
+std::vector<std::string> names_in(const Result<ImportedLabels>& imported) {
+    std::vector<std::string> names;
+    if (!imported) {
+        ADD_FAILURE() << std::string(imported.error().message());
+        return names;
+    }
+    for (std::size_t n = 1; n < imported->labels.labels.size(); ++n)
+        names.push_back(imported->labels.labels[n].name);
+    std::sort(names.begin(), names.end());
+    return names;
+}
+
+TEST(MaskFolder, WhatAllMasksOfAFolderShareIsNoPartOfTheirNames) {
+    const std::vector<std::string> organs{"kidney_right", "liver", "spleen"};
+    const TemporaryFolder folder;
+    int n = 0;
+    for (const auto& [front, back] :
+         {std::pair{"case_01_", ""}, std::pair{"", "_mask"}, std::pair{"s0004 - ", ".seg"}}) {
+        const std::string in = "m" + std::to_string(n++) + "/";
+        folder.write(in + front + "liver" + back + ".nii", mask_of(kLiver));
+        folder.write(in + front + "spleen" + back + ".nii", mask_of(kSpleen));
+        folder.write(in + front + "kidney_right" + back + ".nii", mask_of(kKidneyRight));
+        EXPECT_EQ(names_in(import_label_map(folder / in)), organs) << front << back;
+    }
+    // What is known keeps its name, and what is shared but names nothing stays.
+    folder.write("k/kidney_left.nii", mask_of(kLiver));
+    folder.write("k/kidney_right.nii", mask_of(kKidneyRight));
+    EXPECT_EQ(names_in(import_label_map(folder / "k")),
+              (std::vector<std::string>{"kidney_left", "kidney_right"}));
+}
+
+TEST(MaskFolder, MasksThatCannotBeMeantAreToldOf) {
+    const TemporaryFolder folder;
+    for (const auto& [name, value] : {std::pair{"liver", kLiver}, std::pair{"spleen", kSpleen},
+                                      std::pair{"kidney_right", kKidneyRight}})
+        folder.write(std::string("in/") + name + ".nii", mask_of(value, true));
+    const auto turned = import_label_map(folder / "in");
+    ASSERT_TRUE(turned) << turned.error().message();
+    EXPECT_NE(turned->report.warnings.back().find("nothing is left of them: "), std::string::npos)
+        << turned->report.warnings.back();
+    folder.write("bg/liver.nii", mask_of(kLiver));
+    folder.write("bg/background.nii", mask_of(0));
+    EXPECT_EQ(names_in(import_label_map(folder / "bg")), std::vector<std::string>{"liver"});
+    // A file of 3D Slicer with one segment has its name inside.
+    TinyVolume one = ras_volume();
+    for (std::uint8_t& voxel : one.voxels) voxel = voxel == kLiver;
+    folder.write("seg/1.seg.nrrd", testing::nrrd_bytes(one,
+                                                       "Segment0_Name:=liver\n"
+                                                       "Segment0_LabelValue:=1\n"
+                                                       "Segment0_Layer:=0\n"));
+    folder.write("seg/2.nii", mask_of(kSpleen));
+    EXPECT_EQ(names_in(import_label_map(folder / "seg")), (std::vector<std::string>{"2", "liver"}));
+}
+
+TEST(SegmentNames, TwoSegmentsOfOneValueAreRefused) {
+    const TemporaryFolder folder;
+    std::string fields;
+    for (int n = 0; n < 2; ++n) {
+        const std::string key = "Segment" + std::to_string(n);
+        fields += key + (n == 0 ? "_Name:=liver\n" : "_Name:=spleen\n") + key + "_LabelValue:=5\n" +
+                  key + "_Layer:=0\n";
+    }
+    const std::string path = folder.write("a.seg.nrrd", testing::nrrd_bytes(ras_volume(), fields));
+    const auto refused = import_label_map(path);
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().what.find("value 5 has two names, 'liver' and 'spleen'"),
+              std::string::npos)
+        << refused.error().message();
+    ImportOptions options;
+    options.table = folder.write("t.csv", "1,spleen\n2,kidney_right\n5,liver\n");
+    EXPECT_TRUE(import_label_map(path, options));
 }
 
 }  // namespace

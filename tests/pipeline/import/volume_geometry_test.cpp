@@ -581,5 +581,131 @@ TEST(VolumeGeometry, ChannelsOfZeroAndOneAreOneStructureEach) {
     expect_refused(channels(true, 7), "channels whose values are not 0 and 1");
 }
 
+std::string changed(std::string text, const std::string& from, const std::string& to) {
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+// The header of a file whose voxels follow it.
+std::string header_of(const std::string& bytes) {
+    return bytes.substr(0, bytes.size() - ras_volume().voxels.size());
+}
+
+// The library leaves out what is not there, and the slices behind it come to lie one step lower.
+TEST(VolumeGeometry, EveryFileThatAHeaderNamesIsThere) {
+    const TemporaryFolder folder;
+    const ImportOptions options = named(folder);
+    const TinyVolume volume = ras_volume();
+    const std::size_t slice = volume.voxels.size() / static_cast<std::size_t>(volume.size.z);
+    const std::string data(volume.voxels.begin(), volume.voxels.end());
+    std::string list;
+    for (int k = 0; k < volume.size.z; ++k) {
+        const std::string name = "s" + std::string(k < 10 ? "0" : "") + std::to_string(k) + ".raw";
+        folder.write(name, data.substr(static_cast<std::size_t>(k) * slice, slice));
+        list += "\n" + name;
+    }
+    const std::string last = std::to_string(volume.size.z - 1),
+                      beyond = std::to_string(volume.size.z);
+    const std::string mhd = header_of(testing::mha_bytes(volume));
+    std::string nhdr = header_of(testing::nrrd_bytes(volume));
+    nhdr.pop_back();  // the empty line
+    const auto meta = [&](const std::string& files) {
+        return import_label_map(folder.write("a.mhd", changed(mhd, "LOCAL", files)), options);
+    };
+    const auto nrrd = [&](const std::string& files) {
+        return import_label_map(folder.write("a.nhdr", nhdr + "data file: " + files + "\n"),
+                                options);
+    };
+    for (const std::string& files : {"s%02d.raw 0 " + last + " 1", "LIST" + list}) {
+        EXPECT_EQ(wrong_voxels(meta(files)), 0u) << files;
+        EXPECT_EQ(wrong_voxels(nrrd(files)), 0u) << files;
+    }
+    for (const auto& read : {meta("s%02d.raw 1 " + beyond + " 1"), meta("LIST" + list + "\nx.raw"),
+                             nrrd("s%02d.raw 1 " + beyond + " 1"), nrrd("LIST" + list + "\nx.raw")})
+        expect_refused(read, "is not there, one of ");
+    for (const auto& read :
+         {meta("s%02d.raw 1 " + last + " 1"), nrrd("s%02d.raw 1 " + last + " 1")})
+        expect_refused(read, "header asks for");
+    for (const char* odd : {"s%s.raw 0 9 1", "s%02d%n.raw 0 9 1", "s%02d.raw", "s%02d.raw 0 9 0"})
+        expect_refused(meta(odd), "the pattern of its data files");
+}
+
+TEST(VolumeGeometry, BytesThatTheHeaderDoesNotAccountForAreTold) {
+    const TemporaryFolder folder;
+    const ImportOptions options = named(folder);
+    const TinyVolume volume = ras_volume();
+    const std::string data(volume.voxels.begin(), volume.voxels.end());
+    folder.write("a.raw", std::string(100, 'h') + data);
+    std::string nhdr = header_of(testing::nrrd_bytes(volume));
+    nhdr.pop_back();
+    const std::string mhd = changed(header_of(testing::mha_bytes(volume)),
+                                    "ElementDataFile = LOCAL", "ElementDataFile = a.raw");
+    const auto meta = [&](const std::string& more) {
+        return import_label_map(
+            folder.write("a.mhd", changed(mhd, "ElementDataFile", more + "ElementDataFile")),
+            options);
+    };
+    const auto nrrd = [&](const std::string& more) {
+        return import_label_map(folder.write("a.nhdr", nhdr + more + "data file: a.raw\n"),
+                                options);
+    };
+    EXPECT_TRUE(says(meta(""), "holds 100 bytes more than its header asks for"));
+    EXPECT_TRUE(says(nrrd(""), "holds 100 bytes more than its header asks for"));
+    for (const auto& read : {meta("HeaderSize = -1\n"), meta("HeaderSize = 100\n"),
+                             nrrd("byte skip: -1\n"), nrrd("byte skip: 100\n")}) {
+        EXPECT_EQ(wrong_voxels(read), 0u);
+        EXPECT_FALSE(says(read, "bytes more"));
+    }
+    const std::string packed = testing::mha_bytes(volume, true);
+    const std::size_t at = packed.find("CompressedDataSize = ") + 21;
+    std::string fewer = packed;
+    fewer.replace(at, packed.find('\n', at) - at, "40");
+    expect_refused(import_label_map(folder.write("c.mha", fewer), options),
+                   "CompressedDataSize of the header is 40");
+}
+
+TEST(VolumeGeometry, WhatAnNrrdHeaderLacksIsNamed) {
+    const TemporaryFolder folder;
+    const ImportOptions options = named(folder);
+    const TinyVolume volume = ras_volume();
+    const std::string good = testing::nrrd_bytes(volume);
+    const auto read = [&](const std::string& bytes) {
+        return import_label_map(folder.write("a.nrrd", bytes), options);
+    };
+    expect_refused(read(changed(good, "left-posterior-superior", "RPI")), "the space 'RPI'");
+    std::string words;
+    for (const std::uint8_t voxel : volume.voxels) words += {static_cast<char>(voxel), '\0'};
+    const std::string wide = changed(header_of(good), "unsigned char", "short");
+    expect_refused(read(wide + words), "(endian)");
+    const auto with_order = [&](const char* order) {
+        return wide.substr(0, wide.size() - 1) + "endian: " + order + "\n\n" + words;
+    };
+    EXPECT_EQ(wrong_voxels(read(with_order("little"))), 0u);
+    // Bytes in the other order make multiples of 256.
+    ImportOptions unnamed;
+    expect_refused(import_label_map(folder.write("a.nrrd", with_order("big")), unnamed),
+                   "every value is a multiple of 256");
+    expect_refused(read(changed(good, "sizes: ", "sizes: 1 1 ")), "axes");
+    const std::size_t at = good.find("space origin");
+    std::string without = good;
+    without.erase(at, good.find('\n', at) + 1 - at);
+    EXPECT_TRUE(says(read(without), "no origin (space origin)"));
+    const std::string meta = testing::mha_bytes(volume);
+    EXPECT_TRUE(
+        says(import_label_map(folder.write("a.mha", changed(meta, "\nOffset", "\nOther")), options),
+             "no origin (Offset)"));
+}
+
+TEST(VolumeGeometry, ASingleSliceIsNoVolume) {
+    const TemporaryFolder folder;
+    std::string bytes = testing::nifti_bytes(ras_volume());
+    const std::int16_t one = 1;
+    put(bytes, 46, one);
+    bytes.resize(352 + static_cast<std::size_t>(ras_volume().size.x * ras_volume().size.y));
+    bytes[352 + 700] = 1;
+    expect_refused(import_label_map(folder.write("a.nii", bytes), named(folder)), "a single slice");
+}
+
 }  // namespace
 }  // namespace sonocase::pipeline

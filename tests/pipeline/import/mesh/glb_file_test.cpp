@@ -46,6 +46,35 @@ TEST(GlbFile, TakesTheNodesOfItsScene) {
     EXPECT_EQ(aside, (std::vector<std::string>{"draft"}));
 }
 
+TEST(GlbFile, NamesOfMeshesCountWhereNodesHaveNone) {
+    const Surface ball = ball_mesh({0, 0, 0}, 1, 6);
+    const auto nodes = read_glb(
+        glb_of({{"", ball, "", "liver"}, {"spleen", ball, "", "Mesh.001"}, {"", ball, ""}}),
+        "x.glb");
+    ASSERT_TRUE(nodes) << nodes.error().message();
+    ASSERT_EQ(nodes->size(), 3u);
+    EXPECT_EQ((*nodes)[0].name, "liver");
+    EXPECT_EQ((*nodes)[1].name, "spleen");
+    EXPECT_EQ((*nodes)[2].name, "node_2");
+}
+
+TEST(GlbFile, ReadsStripsAndFansAndLeavesLinesAside) {
+    Surface corners;  // a square, and triples of the indices 0 1 2, 3 0 1
+    corners.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
+    corners.triangles = {{0, 1, 2}, {3, 3, 0}};
+    std::vector<std::string> aside;
+    const auto nodes = read_glb(glb_of({{"strip", corners, "", "", 5},
+                                        {"fan", corners, "", "", 6},
+                                        {"lines", corners, "", "", 1}}),
+                                "x.glb", &aside);
+    ASSERT_TRUE(nodes) << nodes.error().message();
+    ASSERT_EQ(nodes->size(), 2u);
+    using Triangles = std::vector<std::array<std::uint32_t, 3>>;
+    EXPECT_EQ((*nodes)[0].surface.triangles, (Triangles{{0, 1, 2}, {2, 1, 3}}));
+    EXPECT_EQ((*nodes)[1].surface.triangles, (Triangles{{0, 1, 2}, {0, 2, 3}}));
+    EXPECT_EQ(aside, (std::vector<std::string>{"lines"}));
+}
+
 TEST(GlbFile, EveryTruncationIsRefusedInOneLine) {
     const auto whole = glb_of({{"a", ball_mesh({0, 0, 0}, 1, 6), ""}});
     for (std::size_t n = 0; n < whole.size(); n += 7) {

@@ -84,7 +84,14 @@ TEST_F(MeshFolder, ListsNodesWithoutARowAndRefusesSheets) {
 
 TEST_F(MeshFolder, SaysThatTheUnitIsWrong) {
     write("a.glb", {{"a", ball_mesh({0, 0, 0}, 0.1), ""}});
-    EXPECT_NE(refusal("a,liver,organ\n").find("metres"), std::string::npos);
+    EXPECT_NE(refusal("a,liver,organ\n").find("these look like metres: give --scale 1000"),
+              std::string::npos);
+    write("a.glb", {{"a", ball_mesh({0, 0, 0}, 200000), ""}});
+    EXPECT_NE(refusal("a,liver,organ\n").find("look like millimetres: give --scale 0.001"),
+              std::string::npos);
+    write("a.glb", {{"a", ball_mesh({0, 0, 0}, 20000), ""}});
+    EXPECT_NE(refusal("a,liver,organ\n").find("look like centimetres: give --scale 0.01"),
+              std::string::npos);
 }
 
 TEST_F(MeshFolder, WarnsOfTwoFilesOfOneOrgan) {

@@ -62,6 +62,8 @@ struct GlbNode {
     std::string name;
     Surface surface;
     std::string more;  // members of the node: "\"translation\":[1,0,0]"
+    std::string mesh_name = {};
+    int mode = 4;  // of the primitive
 };
 
 inline std::vector<std::uint8_t> glb_of(const std::vector<GlbNode>& nodes,
@@ -87,7 +89,9 @@ inline std::vector<std::uint8_t> glb_of(const std::vector<GlbNode>& nodes,
         const auto num = [](std::size_t v) { return std::to_string(v); };
         node_list += comma + "{\"name\":\"" + nodes[n].name + "\",\"mesh\":" + num(n) +
                      (nodes[n].more.empty() ? "" : "," + nodes[n].more) + "}";
-        meshes += comma + "{\"primitives\":[{\"attributes\":{\"POSITION\":" + num(2 * n) +
+        meshes += comma + "{\"name\":\"" + nodes[n].mesh_name +
+                  "\",\"primitives\":[{\"mode\":" + std::to_string(nodes[n].mode) +
+                  ",\"attributes\":{\"POSITION\":" + num(2 * n) +
                   "},\"indices\":" + num(2 * n + 1) + "}]}";
         views += comma + "{\"buffer\":0,\"byteOffset\":" + num(points_at) +
                  ",\"byteLength\":" + num(corners_at - points_at) +

@@ -290,6 +290,36 @@ TEST(ViperOverUsb, DrivesThePlayer) {
     EXPECT_GT(sonocase::testing::read_text(folder / "frames/frame_00239.png").size(), 20000u);
 }
 
+// The second sensor is on the mannequin, which moves with it: only relative to it does the probe
+// stand on the skin.
+TEST(ViperOverUsb, AReferenceOnTheMannequinCountsLive) {
+    const sonocase::testing::TemporaryFolder folder;
+    ASSERT_TRUE(save_bundle(sonocase::testing::small_case(), folder / "cylinder.sonocase"));
+    const Matrix3 turn = rotation_about({0, 0, 1}, 0.5 * kPi);
+    const Rigid world_from_probe{turn, {100, -50, 0}}, world_from_reference{turn, {110, -50, 0}};
+    const Rigid mannequin_from_probe{rotation_about({1, 0, 0}, kPi), {0, 0, 59}};
+    Calibration mannequin;
+    mannequin.kind = "mannequin";
+    mannequin.sensor_from_tool =
+        inverse(world_from_reference) * world_from_probe * inverse(mannequin_from_probe);
+    ASSERT_TRUE(save_calibration(mannequin, folder / "mannequin.json"));
+    DeviceSpec device;
+    device.vendor = 0x0F44;
+    device.product = 0xBF01;
+    const auto last_picture = [&](const std::string& role) {
+        const ClientResult result = run_with_device(
+            device, [] { return std::make_unique<ViperFirmware>(Trouble{.hz = 120}); },
+            {SONOCASE_BIN "/sonoplay", folder / "cylinder.sonocase", "--headless", "--tracker",
+             "viper", "--tool", role, "--model", "paper", "--frames", "60", "--calibration",
+             folder / "mannequin.json", "--out", folder / "frames"});
+        EXPECT_EQ(result.status, 0) << result.out;
+        return sonocase::testing::read_text(folder / "frames/frame_00059.png").size();
+    };
+    const std::size_t of_air = last_picture("needle=2"), of_tissue = last_picture("reference=2");
+    EXPECT_GT(of_tissue, 20000u);
+    EXPECT_LT(of_air, of_tissue / 2);
+}
+
 TEST(ViperOverUsb, ReportsTwoOfAKind) {
     DeviceSpec device;
     device.second_alike = true;
