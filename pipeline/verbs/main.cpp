@@ -56,6 +56,7 @@ const std::vector<Verb>& hand_written_verbs() {
         {kStage, "pack", "put the stages' files into a bundle", verb_pack, stage_names::kPack},
         {kFarm, "plan", "find what a build farm has to run", verb_plan, ""},
         {kFarm, "cache", "tidy a folder of stage results", verb_cache, ""},
+        {kSession, "markers", "print sheets that one camera follows", verb_markers, ""},
         {kSession, "calibrate", "find tips, axes and frames of tracked tools", verb_calibrate, ""},
         {kSession, "review", "make a page of a recorded session", verb_review, ""},
         {kSession, "score", "score a recording of this or another trainer", verb_score, ""},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// sonocase calibrate point|direction|needle|mannequin|image|lag
+// sonocase calibrate point|direction|needle|mannequin|image|lag|camera
 #include "pipeline/verbs/verb_calibrate.h"
 
 #include <cmath>
@@ -206,6 +206,9 @@ constexpr SubVerb kSubVerbs[] = {
      calibrate_mannequin},
     {"image", "the image in the probe, from touches of both ends of the face", calibrate_image},
     {"lag", "how much later one recording shows a motion than another", calibrate_lag},
+#ifdef SONOCASE_CAMERA
+    {"camera", "a camera's lens, from a video of the printed board", calibrate_camera},
+#endif
 };
 
 }  // namespace

@@ -56,5 +56,6 @@ int calibrate_needle(int argc, char** argv);
 int calibrate_mannequin(int argc, char** argv);
 int calibrate_image(int argc, char** argv);
 int calibrate_lag(int argc, char** argv);
+int calibrate_camera(int argc, char** argv);
 
 }  // namespace sonocase::pipeline::inline verbs

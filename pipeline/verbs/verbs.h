@@ -43,6 +43,7 @@ int verb_inspect(int argc, char** argv);
 int verb_landmarks(int argc, char** argv);
 int verb_look(int argc, char** argv);
 int verb_map(int argc, char** argv);
+int verb_markers(int argc, char** argv);
 int verb_pack(int argc, char** argv);
 int verb_plan(int argc, char** argv);
 int verb_progress(int argc, char** argv);

@@ -10,6 +10,9 @@
 #include "runtime/tracking/replay_tracker.h"
 #include "runtime/tracking/scripted_sweep.h"
 #include "runtime/tracking/tracker.h"
+#ifdef SONOCASE_CAMERA
+#include "runtime/tracking/camera/camera_tracker.h"
+#endif
 
 namespace sonocase::runtime::inline tracking_devices {
 namespace {
@@ -102,6 +105,20 @@ Made make_igtl(const std::string& argument, const TrackerContext& context) {
     return IgtlTracker::start(options, context.clock);
 }
 
+#ifdef SONOCASE_CAMERA
+// A video is read to its end before the first frame: it is a function of time, as a recording is.
+Made make_camera(const std::string& argument, const TrackerContext& context) {
+    SONOCASE_TRY(const CameraArgument camera, parse_camera_argument(argument));
+    if (camera.video.empty()) {
+        const int number = camera.number;
+        return Made(std::make_unique<CameraTracker>([number] { return open_v4l2_camera(number); },
+                                                    context.clock, camera.options));
+    }
+    SONOCASE_TRY(Recording recording, load_camera_video(camera.video, camera.options));
+    return Made(std::make_unique<ReplayTracker>(std::move(recording), context.loop));
+}
+#endif
+
 template <std::unique_ptr<UsbDriver> (*make_driver)()>
 Made make_usb(const std::string&, const TrackerContext& context) {
     return Made(std::make_unique<UsbTracker>(make_driver(), context.clock));
@@ -118,6 +135,10 @@ constexpr TrackerKind kTrackers[] = {
     {"replay", "replay:FILE[,NEEDLE_FILE]", kRequired, nullptr, nullptr, kNotStepped, make_replay},
     {"igtl", "igtl:HOST:PORT | igtl:listen:PORT", kRequired, "OpenIGTLink, this machine",
      "igtl:127.0.0.1:18944", kNotStepped, make_igtl, true},
+#ifdef SONOCASE_CAMERA
+    {"camera", "camera[:N|VIDEO][,CAMERA.json]", kOptional, "Camera and printed markers", "camera",
+     kStepped, make_camera},
+#endif
     {"viper", "viper", kNone, "Polhemus Viper", "viper", kStepped, make_usb<make_viper_driver>},
     {"3dg", "3dg", kNone, "NDI 3D Guidance", "3dg", kStepped, make_usb<make_guidance_driver>},
     {"liberty", "liberty", kNone, "Polhemus Liberty / Patriot", "liberty", kStepped,

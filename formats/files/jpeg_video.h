@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Videos of a camera as files: an AVI whose pictures are JPEG, as cameras write it, or a folder of
+// JPEG files in the order of their names.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/base/result.h"
+
+namespace sonocase {
+
+struct JpegVideo {
+    std::vector<std::vector<std::uint8_t>> pictures;  // empty: a picture that was dropped
+    double rate_hz = 30;
+};
+
+// Errors: no AVI, another codec than MJPG, no pictures, a chunk that leaves the file.
+Result<JpegVideo> parse_avi(std::span<const std::uint8_t> bytes, const std::string& where);
+// Errors: those of parse_avi and of reading files; a folder without .jpg or .jpeg files.
+Result<JpegVideo> load_jpeg_video(const std::string& path);
+
+}  // namespace sonocase

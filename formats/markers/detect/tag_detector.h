@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Finds printed tags in grey pictures with libapriltag, refines their corners, and follows the
+// bodies that bear them from picture to picture.
+//
+// The library is opened when the first detector is made, so that a player that follows another
+// tracker needs neither it nor its memory. One detector serves one thread. No files, no clock.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "formats/base/result.h"
+#include "formats/markers/marker_follower.h"
+
+namespace sonocase {
+
+struct TagFindings {
+    std::vector<SeenTag> tags;  // by id; each id once
+    std::vector<int> twice;     // ids that were seen in two places, which are left out of `tags`
+    int unrefined = 0;  // tags that were read but could not be laid over the picture: left out
+};
+
+// Pixels from (x0, y0) up to but without (x1, y1).
+struct PictureRegion {
+    int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+};
+
+class TagDetector {
+  public:
+    // Error: the library is not installed.
+    static Result<TagDetector> create();
+    TagDetector(TagDetector&&) noexcept;
+    TagDetector& operator=(TagDetector&&) noexcept;
+    ~TagDetector();
+
+    // The whole picture with every tag refined. Cost: about 25 ms for 1280 x 720, and 0.2 ms per
+    // tag.
+    TagFindings find(const GreyPicture& picture);
+    // Adds the tags of a part of the picture to `tags`, with corners to a pixel or so. step:
+    // squares are looked for on every so many pixels. Cost: 25 ms at a step of 2 for 1280 x 720, 11
+    // ms at 3; less for parts in proportion.
+    void read(const GreyPicture& picture,
+              const PictureRegion& region,
+              int step,
+              std::vector<SeenTag>& tags);
+    // The number of tags that are seen once the picture is mirrored: a camera that shows its user
+    // as a mirror does.
+    int count_mirrored(const GreyPicture& picture);
+
+  private:
+    struct State;
+    explicit TagDetector(std::unique_ptr<State> state);
+    std::unique_ptr<State> state_;
+};
+
+// Bodies and board through a stream of pictures. What was seen in the last picture is looked for
+// where it should be now; for what was not, a third of the picture is searched, then the next, so
+// that it is found within three pictures. The thirds are searched now and then anyhow, for a second
+// sheet or a wrong one.
+class PictureFollower {
+  public:
+    PictureFollower(TagDetector detector, MarkerFollower follower);
+    // time_s: of the middle of the exposure, rising. Cost: 6 to 11 ms for 1280 x 720 (benchmark
+    // Camera), and up to 30 for the first picture.
+    FollowerPicture follow(const GreyPicture& picture, double time_s);
+    // Whether any tag at all was read in the last picture.
+    bool any_tags() const { return any_tags_; }
+    TagDetector& detector() { return detector_; }
+    const MarkerFollower& follower() const { return follower_; }
+
+  private:
+    struct Place {
+        Pixel middle;
+        std::int64_t picture = -1000;
+    };
+    void look_at_board(const GreyPicture& picture);
+    void look_at_tool(const GreyPicture& picture, MarkerRole role, const Rigid& camera_from_body);
+    bool seen(MarkerRole role, int tags) const;
+    void note_twice();
+
+    TagDetector detector_;
+    MarkerFollower follower_;
+    std::vector<int> board_order_;  // its tags, each as far as possible from those before it
+    std::vector<SeenTag> raw_, fitted_;
+    std::vector<int> twice_;
+    std::array<Place, kMarkerTagIds> places_;
+    std::array<std::int64_t, kMarkerTagIds> twice_until_;
+    static constexpr int kParts = 3;
+    std::int64_t picture_ = 0;
+    int part_ = 0;
+    std::array<int, kParts> foreign_{};  // in each part, when it was last searched
+    bool any_tags_ = false;
+};
+
+}  // namespace sonocase

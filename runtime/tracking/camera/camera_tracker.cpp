@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "runtime/tracking/camera/camera_tracker.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "formats/files/atomic_file.h"
+#include "formats/files/jpeg_video.h"
+#include "formats/markers/detect/tag_detector.h"
+
+namespace sonocase::runtime::inline tracking_camera {
+namespace {
+
+constexpr const char* kNotCalibrated =
+    "This camera is not calibrated: it is taken to see 65 degrees across. Lengths may be off by a "
+    "fifth until sonocase calibrate camera has measured it.";
+
+// Why a picture without tags has none.
+Message what_is_wrong(const GreyImage& picture, TagDetector& detector) {
+    constexpr std::size_t kEvery = 97;  // pixels
+    double sum = 0, count = 0;
+    for (std::size_t i = 0; i < picture.pixels.size(); i += kEvery) {
+        sum += picture.pixels[i];
+        count += 1;
+    }
+    constexpr double kDark = 16;
+    if (sum < kDark * count)
+        return "The camera's picture is dark: switch a light on, or open its cover.";
+    const GreyPicture grey{picture.pixels.data(), picture.width_px, picture.height_px,
+                           picture.width_px};
+    if (detector.count_mirrored(grey) > 0)
+        return "The camera's picture is mirrored: switch mirroring off in the camera's settings.";
+    return "The camera sees no tag: place the printed bodies and the board in its view.";
+}
+
+// The same for a stream: after a second without tags, and twice a second from then on.
+class EmptyPictures {
+  public:
+    Message sentence(const GreyImage& picture, bool any_tags, TagDetector& detector, double now_s) {
+        if (any_tags || since_s_ < 0) {
+            since_s_ = now_s;
+            sentence_ = {};
+        } else if (now_s - since_s_ > 1 && now_s - judged_s_ > 0.5) {
+            judged_s_ = now_s;
+            sentence_ = what_is_wrong(picture, detector);
+        }
+        return sentence_;
+    }
+
+  private:
+    double since_s_ = -1, judged_s_ = -1;
+    Message sentence_;
+};
+
+Result<CameraModel> model_for(const CameraTrackerOptions& options, int width_px, int height_px) {
+    constexpr int kMinWidth = 480;
+    if (std::max(width_px, height_px) < kMinWidth) {
+        return Error{Message("The camera's pictures of {} x {} are too small: tags cannot be read.",
+                             {std::to_string(width_px), std::to_string(height_px)}),
+                     "", ""};
+    }
+    if (!options.calibrated) return assumed_camera(width_px, height_px);
+    return at_size(options.setup.camera, width_px, height_px);
+}
+
+SensorState state_of(MarkerStatus status) {
+    return status == MarkerStatus::good   ? SensorState::ok
+           : status == MarkerStatus::poor ? SensorState::poor
+                                          : SensorState::lost;
+}
+
+}  // namespace
+
+CameraTracker::CameraTracker(OpenSource open, SessionClock clock, CameraTrackerOptions options)
+    : open_(std::move(open)), clock_(std::move(clock)), options_(std::move(options)) {
+    health_.device = "Camera";
+    thread_ = std::thread([this] { run(); });
+}
+
+CameraTracker::~CameraTracker() {
+    stop_ = true;
+    thread_.join();
+}
+
+bool CameraTracker::poll(double, TrackerReading& reading) {
+    if (!box_.refresh()) return false;
+    reading = box_.value();
+    return true;
+}
+
+TrackerHealth CameraTracker::health() const {
+    const std::lock_guard lock(mutex_);
+    return health_;
+}
+
+void CameraTracker::set_wake(std::function<void()> wake) {
+    const std::lock_guard lock(mutex_);
+    wake_ = std::move(wake);
+}
+
+void CameraTracker::set_health(TrackerPhase phase, const Message& message) {
+    const std::lock_guard lock(mutex_);
+    health_.phase = phase;
+    health_.message = message;
+}
+
+void CameraTracker::pause(double seconds) {
+    const double until_s = clock_() + seconds;
+    while (!stop_ && clock_() < until_s) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+}
+
+void CameraTracker::run() {
+    set_health(TrackerPhase::searching, "Looking for a camera.");
+    while (!stop_) {
+        Result<std::unique_ptr<PictureSource>> source = open_();
+        if (source) {
+            stream(**source);
+        } else {
+            const Error& error = source.error();
+            // A camera that is there and cannot be used needs the user.
+            set_health(TrackerPhase::searching, error.where.empty() ? error.what : error.message());
+        }
+        pause(options_.retry_s);
+    }
+}
+
+void CameraTracker::stream(PictureSource& source) {
+    Result<TagDetector> detector = TagDetector::create();
+    const Result<CameraModel> camera = model_for(options_, source.width_px(), source.height_px());
+    if (!detector || !camera) {
+        set_health(TrackerPhase::failed,
+                   !detector ? detector.error().message() : camera.error().message());
+        while (!stop_) pause(options_.retry_s);
+        return;
+    }
+    {
+        const std::lock_guard lock(mutex_);
+        health_.device = "Camera " + source.name();
+        health_.phase = TrackerPhase::starting;
+        ++health_.connects;
+    }
+    PictureFollower follower(std::move(*detector),
+                             MarkerFollower(*camera, marker_bodies(options_.setup.markers)));
+    EmptyPictures empty;
+    GreyImage picture;
+    double last_s = -1, period_s = 0;
+    constexpr double kSilenceS = 3;
+    double heard_s = clock_();
+    while (!stop_) {
+        double age_s = 0;
+        Result<bool> came = source.next(picture, age_s);
+        const double now_s = clock_();
+        if (!came) {
+            set_health(TrackerPhase::searching, came.error().what);
+            return;
+        }
+        if (!*came) {
+            if (now_s - heard_s > kSilenceS) {
+                set_health(TrackerPhase::searching,
+                           "The camera sends no pictures: it is started again.");
+                return;
+            }
+            continue;
+        }
+        heard_s = now_s;
+        const double time_s = now_s - age_s;
+        const FollowerPicture seen = follower.follow(
+            {picture.pixels.data(), picture.width_px, picture.height_px, picture.width_px}, time_s);
+        TrackerReading reading;
+        reading.sequence = ++sequence_;
+        reading.time_s = clock_();
+        reading.device_time_s = time_s;
+        reading.sensor_count = 2;
+        for (int k = 0; k < 2; ++k) {
+            SensorReading& sensor = reading.sensors[k];
+            sensor.state = state_of(seen.tools[k].status);
+            sensor.world_from_sensor = seen.tools[k].world_from_body;
+            // 1 at a tenth of a millimetre, 0.5 at one.
+            sensor.quality = seen.tools[k].sigma_mm < 0
+                                 ? 0
+                                 : static_cast<float>(1 / (1 + seen.tools[k].sigma_mm));
+            sensor.time_s = time_s;
+        }
+        box_.publish(reading);
+        if (last_s >= 0)
+            period_s = period_s > 0 ? 0.9 * period_s + 0.1 * (now_s - last_s) : now_s - last_s;
+        last_s = now_s;
+        Message message = empty.sentence(picture, follower.any_tags(), follower.detector(), now_s);
+        if (message.empty()) message = seen.problem;
+        if (message.empty() && !options_.calibrated) message = kNotCalibrated;
+        std::function<void()> wake;
+        {
+            const std::lock_guard lock(mutex_);
+            health_.phase = TrackerPhase::streaming;
+            health_.message = message;
+            health_.rate_hz = period_s > 0 ? 1 / period_s : 0;
+            ++health_.readings;
+            wake = wake_;
+        }
+        if (wake) wake();
+    }
+}
+
+Result<Recording> load_camera_video(const std::string& path, const CameraTrackerOptions& options) {
+    SONOCASE_TRY(const JpegVideo video, load_jpeg_video(path));
+    SONOCASE_TRY(GreyJpegReader reader, GreyJpegReader::create());
+    SONOCASE_TRY(TagDetector detector, TagDetector::create());
+    Recording recording;
+    recording.name = path;
+    std::optional<PictureFollower> follower;
+    GreyImage picture;
+    Message problem, nothing_seen;
+    bool any_tags = false;
+    int probes = 0, needles = 0, damaged = 0;
+    for (std::size_t i = 0; i < video.pictures.size(); ++i) {
+        const double time_s = static_cast<double>(i) / video.rate_hz;
+        Pose probe, needle;
+        probe.frame = needle.frame = static_cast<std::int64_t>(i);
+        probe.timestamp_s = needle.timestamp_s = time_s;
+        if (!reader.read(video.pictures[i], picture)) {
+            ++damaged;
+        } else {
+            if (!follower) {
+                SONOCASE_TRY(const CameraModel camera,
+                             model_for(options, picture.width_px, picture.height_px));
+                follower.emplace(std::move(detector),
+                                 MarkerFollower(camera, marker_bodies(options.setup.markers)));
+            }
+            const CameraModel& camera = follower->follower().camera();
+            if (picture.width_px != camera.width_px || picture.height_px != camera.height_px)
+                return Error{"the size of the pictures changes", path, "use one video at a time"};
+            const FollowerPicture seen = follower->follow(
+                {picture.pixels.data(), picture.width_px, picture.height_px, picture.width_px},
+                time_s);
+            probe.tracker_from_tool = seen.tools[0].world_from_body;
+            needle.tracker_from_tool = seen.tools[1].world_from_body;
+            probe.ok = seen.tools[0].status == MarkerStatus::good;
+            needle.ok = seen.tools[1].status == MarkerStatus::good;
+            probes += probe.ok, needles += needle.ok;
+            if (problem.empty()) problem = seen.problem;
+            any_tags = any_tags || follower->any_tags();
+            if (!any_tags && nothing_seen.empty())
+                nothing_seen = what_is_wrong(picture, follower->detector());
+        }
+        recording.probe.push_back(probe);
+        recording.needle.push_back(needle);
+    }
+    if (!any_tags) problem = nothing_seen;
+    if (probes == 0 && needles == 0)
+        return Error{problem.empty()
+                         ? Message("no picture shows a probe or a needle that can be followed")
+                         : problem,
+                     path, ""};
+    if (needles == 0) recording.needle.clear();
+    if (damaged > 0) {
+        recording.note =
+            Message("{} pictures of the video cannot be read.", {std::to_string(damaged)});
+    } else if (!options.calibrated) {
+        recording.note = kNotCalibrated;
+    } else if (!problem.empty()) {
+        recording.note = problem;
+    }
+    return recording;
+}
+
+Result<CameraArgument> parse_camera_argument(const std::string& argument) {
+    CameraArgument out;
+    std::string source = argument;
+    constexpr std::string_view kEnding = ".json";
+    const std::size_t comma = argument.rfind(',');
+    const std::string last = comma == std::string::npos ? argument : argument.substr(comma + 1);
+    if (last.size() > kEnding.size() &&
+        last.compare(last.size() - kEnding.size(), kEnding.size(), kEnding) == 0) {
+        SONOCASE_TRY(const std::string text, read_text_file(last));
+        SONOCASE_TRY(out.options.setup, parse_camera(text, last));
+        out.options.calibrated = true;
+        source = comma == std::string::npos ? "" : argument.substr(0, comma);
+    }
+    if (source.empty()) return out;
+    if (source.size() <= 2 && source.find_first_not_of("0123456789") == std::string::npos) {
+        out.number = std::stoi(source);
+        return out;
+    }
+    out.video = source;
+    return out;
+}
+
+}  // namespace sonocase::runtime::inline tracking_camera

@@ -1,0 +1,446 @@
+// SPDX-License-Identifier: Apache-2.0
+
+// Poses from rendered video, against what was rendered.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <functional>
+#include <optional>
+#include <tuple>
+#include <vector>
+
+#include <apriltag/apriltag.h>
+#include <apriltag/tag36h11.h>
+#include <dlfcn.h>
+
+#include "formats/base/constants.h"
+#include "formats/markers/detect/tag_detector.h"
+#include "support/marker_jpeg.h"
+#include "support/marker_video.h"
+
+namespace sonocase {
+namespace {
+
+using testing::MarkerVideo;
+using testing::PlacedBody;
+using testing::still_body;
+using testing::VideoOptions;
+
+CameraModel test_camera() {
+    CameraModel camera = assumed_camera(1280, 720);
+    camera.k1 = -0.1, camera.k2 = 0.02, camera.p1 = 0.0005;
+    return camera;
+}
+
+// A table under a camera that looks down on it: z of the table is up, its origin is in the middle
+// of the picture.
+Rigid camera_from_table(double distance_mm, double elevation_rad) {
+    const double c = std::cos(elevation_rad), s = std::sin(elevation_rad);
+    const Vector3 forward{0, c, -s}, right{1, 0, 0}, down = cross(forward, right);
+    return {transpose(Matrix3::from_columns(right, down, forward)), {0, 0, distance_mm}};
+}
+
+// A tool held upright, turned at will about its axis and tilted by up to 40 degrees about two axes.
+Matrix3 held(RandomStream& random) {
+    return rotation_about({1, 0, 0}, random.uniform(-40, 40) * kRadPerDeg) *
+           rotation_about({0, 1, 0}, random.uniform(-40, 40) * kRadPerDeg) *
+           rotation_about({0, 0, 1}, random.uniform(-kPi, kPi));
+}
+
+class MarkerPose : public ::testing::Test {
+  protected:
+    MarkerPose() : bodies_(marker_bodies()), video_(camera_), detector_(TagDetector::create()) {}
+    void SetUp() override { ASSERT_TRUE(detector_) << "libapriltag is not installed"; }
+
+    // Its pixels last until the next picture.
+    GreyPicture picture_of(const std::vector<PlacedBody>& placed,
+                           double time_s,
+                           const VideoOptions& options = {}) {
+        picture_ = testing::through_jpeg(video_.take(placed, time_s, options), 1280, 720, 75);
+        return {picture_.data(), 1280, 720, 1280};
+    }
+    TagFindings look(const std::vector<PlacedBody>& placed,
+                     double time_s,
+                     const VideoOptions& options = {}) {
+        return detector_->find(picture_of(placed, time_s, options));
+    }
+    std::vector<TagSight> sights(const TagFindings& found, int body) const {
+        std::vector<TagSight> out;
+        for (const SeenTag& tag : found.tags) {
+            const TagPlace place = find_tag(bodies_, tag.id);
+            if (place.body == body) out.push_back({&bodies_[body].tags[place.tag], &tag});
+        }
+        return out;
+    }
+
+    CameraModel camera_ = test_camera();
+    std::vector<MarkerBody> bodies_;
+    MarkerVideo video_;
+    std::vector<std::uint8_t> picture_;
+    Result<TagDetector> detector_;
+};
+
+TEST_F(MarkerPose, TheCellsAreThoseOfTheLibrary) {
+    void* library = dlopen("libapriltag.so.3", RTLD_NOW);
+    ASSERT_NE(library, nullptr);
+    const auto create =
+        reinterpret_cast<decltype(&tag36h11_create)>(dlsym(library, "tag36h11_create"));
+    const auto draw =
+        reinterpret_cast<decltype(&apriltag_to_image)>(dlsym(library, "apriltag_to_image"));
+    apriltag_family_t* family = create();
+    for (int id = 0; id < kMarkerTagIds; ++id) {
+        const image_u8_t* image = draw(family, id);
+        for (int row = 0; row < kTagCells; ++row)
+            for (int column = 0; column < kTagCells; ++column)
+                EXPECT_EQ(image->buf[(row + 1) * image->stride + column + 1] > 127,
+                          tag_cell_is_white(id, row, column))
+                    << id;
+        std::free(image->buf);
+        std::free(const_cast<image_u8_t*>(image));
+    }
+    reinterpret_cast<decltype(&tag36h11_destroy)>(dlsym(library, "tag36h11_destroy"))(family);
+}
+
+struct Errors {
+    int frames = 0, good = 0, within = 0;
+    double square_mm = 0, square_deg = 0, worst_mm = 0, worst_deg = 0, chi = 0;
+    double rms_mm() const { return std::sqrt(square_mm / good); }
+    double rms_deg() const { return std::sqrt(square_deg / good); }
+};
+
+// Bodies held still at random, found without history.
+Errors still_poses(
+    const std::function<TagFindings(const std::vector<PlacedBody>&, double, VideoOptions)>& look,
+    const CameraModel& camera,
+    const std::vector<MarkerBody>& bodies,
+    const std::function<std::vector<TagSight>(const TagFindings&, int)>& sights,
+    int body,
+    int frames,
+    double near_mm,
+    double far_mm,
+    std::uint64_t seed) {
+    Errors e;
+    RandomStream random(seed);
+    for (int i = 0; i < frames; ++i) {
+        const double elevation = random.uniform(35, 75) * kRadPerDeg;
+        const Rigid table = camera_from_table(0, elevation);
+        const Vector3 ray =
+            direction_at(camera, {random.uniform(150, 1130), random.uniform(120, 600)});
+        const Rigid truth{table.rotation * held(random),
+                          random.uniform(near_mm, far_mm) / norm(ray) * ray};
+        VideoOptions options;
+        options.noise_grey = random.uniform(2, 4);
+        options.defocus_px = random.uniform(0.5, 1.1);
+        const TagFindings found = look({still_body(bodies[body], truth)}, 0.0333 * i, options);
+        const auto seen = sights(found, body);
+        const std::optional<BodyPose> pose = find_body_pose(camera, seen, nullptr);
+        ++e.frames;
+        if (!pose) continue;
+        const FollowerOptions limits;
+        const Point3 tool = bodies[body].body_from_tool * Point3{};
+        if (pose->tags < 2 || pose->margin < limits.good_margin ||
+            worst_sigma_mm(*pose, tool) > limits.good_sigma_mm ||
+            worst_sigma_rad(*pose) > limits.good_sigma_rad)
+            continue;
+        ++e.good;
+        const Vector3 off = pose->camera_from_body * tool - truth * tool;
+        const double deg = kDegPerRad * rotation_angle(transpose(truth.rotation) *
+                                                       pose->camera_from_body.rotation);
+        Matrix3 covariance;
+        covariance.m = point_covariance(*pose, tool);
+        const double chi = dot(off, inverse(covariance) * off);
+        // 99.73 % of a normal distribution in three dimensions.
+        constexpr double kThreeSigma = 14.16;
+        e.within += chi < kThreeSigma;
+        e.chi += chi;
+        e.square_mm += dot(off, off), e.square_deg += deg * deg;
+        e.worst_mm = std::max(e.worst_mm, norm(off)), e.worst_deg = std::max(e.worst_deg, deg);
+    }
+    return e;
+}
+
+#define SONOCASE_STILL(body, frames, near_mm, far_mm, seed)                                        \
+    still_poses([&](const auto& p, double t, const VideoOptions& o) { return look(p, t, o); },     \
+                camera_, bodies_, [&](const TagFindings& f, int b) { return sights(f, b); }, body, \
+                frames, near_mm, far_mm, seed)
+
+TEST_F(MarkerPose, AProbeThatStandsIsFoundToAMillimetre) {
+    const Errors e = SONOCASE_STILL(0, 24, 400, 900, 3);
+    EXPECT_GE(e.good, 0.7 * e.frames);  // of 150 of them 0.93
+    EXPECT_LE(e.rms_mm(), 0.9);
+    EXPECT_LE(e.rms_deg(), 0.3);
+    EXPECT_LE(e.worst_mm, 5);
+    EXPECT_GE(e.within, e.good - 2);
+}
+
+TEST_F(MarkerPose, AtSixHundredMillimetresToHalfAMillimetre) {
+    const Errors e = SONOCASE_STILL(0, 12, 599, 601, 4);
+    EXPECT_GE(e.good, 0.9 * e.frames);
+    EXPECT_LE(e.rms_mm(), 0.5);
+    EXPECT_LE(e.rms_deg(), 0.3);
+}
+
+TEST_F(MarkerPose, ANeedlesTipIsFoundToAMillimetreAndAHalf) {
+    const Errors e = SONOCASE_STILL(1, 14, 400, 900, 5);
+    EXPECT_LE(e.rms_mm(), 1.5);
+}
+
+TEST_F(MarkerPose, WhatIsCalledGoodIsRightWhileTheBoardIsTheWorld) {
+    // A board on the table, a probe that moves to and fro at up to 100 mm/s and turns, seen with
+    // motion blur and a rolling shutter; hidden for half a second in between.
+    const Rigid table = camera_from_table(650, 55 * kRadPerDeg);
+    const Rigid board{table.rotation, table * Point3{0, 120, 0} - Point3{}};
+    const auto probe = [&](double t) {
+        Rigid p;
+        p.rotation = rotation_about(normalized({1, 0.3, 0}), 0.35 * std::sin(2.1 * t)) *
+                     rotation_about({0, 0, 1}, 0.8 * t);
+        p.translation = {40 * std::sin(2.5 * t), -60 + 20 * std::cos(1.7 * t), 150};
+        return table * p;
+    };
+    PictureFollower follower(std::move(*detector_), MarkerFollower(camera_, bodies_));
+    int good = 0, lost = 0;
+    double square_mm = 0, worst_mm = 0, worst_deg = 0;
+    constexpr double kFrameS = 1 / 30.0;
+    constexpr int kFrames = 40;
+    for (int i = 0; i < kFrames; ++i) {
+        const double t = i * kFrameS;
+        const bool hidden = t >= 0.4 && t < 0.9;
+        std::vector<PlacedBody> placed{still_body(bodies_[2], board)};
+        if (!hidden) placed.push_back({&bodies_[0], probe});
+        const FollowerPicture seen = follower.follow(picture_of(placed, t), t);
+        EXPECT_TRUE(seen.board_seen) << i;
+        EXPECT_TRUE(seen.problem.empty()) << seen.problem.format();
+        const MarkerReading& reading = seen.tools[0];
+        // Lost at once and back at once, within a tenth of a second.
+        if (hidden) {
+            EXPECT_EQ(reading.status, MarkerStatus::lost) << i;
+        }
+        if (t < 0.4 || t >= 1.0) {
+            EXPECT_NE(reading.status, MarkerStatus::lost) << i;
+        }
+        lost += reading.status == MarkerStatus::lost;
+        EXPECT_EQ(seen.tools[1].status, MarkerStatus::lost);
+        if (reading.status != MarkerStatus::good) continue;
+        ++good;
+        const Point3 tool = bodies_[0].body_from_tool * Point3{};
+        const Rigid truth = inverse(board) * probe(t);
+        const double off = distance(reading.world_from_body * tool, truth * tool);
+        const double deg = kDegPerRad * rotation_angle(transpose(truth.rotation) *
+                                                       reading.world_from_body.rotation);
+        square_mm += off * off;
+        worst_mm = std::max(worst_mm, off), worst_deg = std::max(worst_deg, deg);
+    }
+    EXPECT_GE(good, 0.8 * (kFrames - lost));
+    EXPECT_LE(lost, 15 + 3);
+    EXPECT_LE(std::sqrt(square_mm / good), 1.5);
+    EXPECT_LE(worst_mm, 5);
+    EXPECT_LE(worst_deg, 2);
+}
+
+TEST_F(MarkerPose, OneTagAloneIsNeverCalledGood) {
+    const Rigid table = camera_from_table(600, 60 * kRadPerDeg);
+    MarkerBody one = bodies_[0];
+    one.tags = {one.tags.back()};
+    one.faces = {one.faces.back()};
+    one.faces[0].tag = 0;
+    MarkerFollower follower(camera_, bodies_, {.with_board = false});
+    RandomStream random(8);
+    for (int i = 0; i < 8; ++i) {
+        const Rigid pose{table.rotation * held(random), {random.uniform(-80, 80), 0, 600}};
+        const TagFindings found = look({still_body(one, pose)}, i / 30.0);
+        EXPECT_NE(follower.follow(found.tags, found.twice, 0, i / 30.0).tools[0].status,
+                  MarkerStatus::good);
+    }
+}
+
+TEST_F(MarkerPose, WhatIsInFrontOfTheCameraInsteadIsSaid) {
+    const Rigid table = camera_from_table(600, 60 * kRadPerDeg);
+    PictureFollower follower(std::move(*detector_), MarkerFollower(camera_, bodies_));
+    const Rigid at{table.rotation, table * Point3{0, 0, 60} - Point3{}};
+    const Rigid aside{table.rotation, table * Point3{120, 0, 60} - Point3{}};
+    // Two probes, the second of which comes later and lies elsewhere: never good from then on.
+    const Rigid board{table.rotation, table * Point3{-120, 60, 0} - Point3{}};
+    int said = 0;
+    for (int i = 0; i < 10; ++i) {
+        std::vector<PlacedBody> placed{still_body(bodies_[2], board), still_body(bodies_[0], at)};
+        if (i >= 1) placed.push_back(still_body(bodies_[0], aside));
+        const FollowerPicture seen = follower.follow(picture_of(placed, i), i / 30.0);
+        const bool twice =
+            seen.problem.format() == "Tag {} is in view twice: put the second sheet away.";
+        said += twice;
+        EXPECT_EQ(seen.tools[0].status == MarkerStatus::good, !twice) << i;
+    }
+    EXPECT_GE(said, 5);
+    // Tags of the same family from elsewhere, and a mirror.
+    PictureFollower second(std::move(*TagDetector::create()), MarkerFollower(camera_, bodies_));
+    MarkerBody foreign = bodies_[2];
+    for (MarkerTag& tag : foreign.tags) tag.id += 26;
+    for (int i = 0; i < 4; ++i) {
+        const FollowerPicture seen =
+            second.follow(picture_of({still_body(foreign, at)}, i), i / 30.0);
+        EXPECT_GE(seen.foreign_tags, 10) << i;
+        EXPECT_EQ(seen.problem.format().substr(0, 10), "These tags") << i;
+    }
+    // The board is hidden.
+    EXPECT_EQ(
+        second.follow(picture_of({still_body(bodies_[0], at)}, 2), 2).problem.format().substr(0, 9),
+        "The board");
+    VideoOptions options;
+    options.mirrored = true;
+    const auto mirrored = video_.take({still_body(bodies_[2], at)}, 3, options);
+    EXPECT_TRUE(second.detector().find({mirrored.data(), 1280, 720, 1280}).tags.empty());
+    EXPECT_GT(second.detector().count_mirrored({mirrored.data(), 1280, 720, 1280}), 10);
+    // Darkness.
+    options.mirrored = false;
+    options.brightness = 0.02;
+    second.follow(picture_of({still_body(bodies_[2], at)}, 4, options), 4);
+    EXPECT_FALSE(second.any_tags());
+}
+
+TEST_F(MarkerPose, ABoardThatIsPushedIsFollowedAtOnce) {
+    const Rigid table = camera_from_table(650, 55 * kRadPerDeg);
+    PictureFollower follower(std::move(*detector_), MarkerFollower(camera_, bodies_));
+    const Rigid probe{table.rotation, table * Point3{0, -60, 110} - Point3{}};
+    for (int i = 0; i < 8; ++i) {
+        // By 15 mm at once, as when somebody bumps into the table.
+        const Rigid board{table.rotation, table * Point3{i < 4 ? 0.0 : 15.0, 120, 0} - Point3{}};
+        const FollowerPicture seen = follower.follow(
+            picture_of({still_body(bodies_[2], board), still_body(bodies_[0], probe)}, i),
+            i / 30.0);
+        EXPECT_TRUE(seen.board_seen) << i;
+        ASSERT_EQ(seen.tools[0].status, MarkerStatus::good) << i;
+        const Point3 tool = bodies_[0].body_from_tool * Point3{};
+        EXPECT_LT(distance(seen.tools[0].world_from_body * tool, inverse(board) * probe * tool),
+                  1.5)
+            << i;
+    }
+}
+
+// Corners as a picture would give them, without pictures: any number of tags of a body that face
+// the camera is hidden, corners are off by normal noise, in a tenth of the pictures by twice what
+// their covariance says, and in a tenth one tag by several pixels.
+struct CornerRun {
+    int pictures = 0, good = 0, poor = 0, one_tag = 0, two_poses = 0, far = 0;
+    double worst_mm = 0, worst_deg = 0;
+};
+CornerRun run_of_corners(const CameraModel& camera,
+                         const std::vector<MarkerBody>& bodies,
+                         int pictures,
+                         std::uint64_t seed) {
+    constexpr double kFarMm = 10, kFarDeg = 5;
+    CornerRun run;
+    RandomStream random(seed);
+    const auto normal = [&] {
+        double sum = 0;
+        for (int k = 0; k < 12; ++k) sum += random.unit();
+        return sum - 6;
+    };
+    MarkerFollower follower(camera, bodies);
+    std::vector<SeenTag> seen;
+    for (int i = 0; i < pictures; ++i) {
+        // A hand's motion for twenty pictures, then another place: history helps and misleads.
+        static Rigid from, to;
+        const Rigid table = camera_from_table(650, 55 * kRadPerDeg);
+        if (i % 20 == 0) {
+            const auto place = [&] {
+                const Vector3 ray =
+                    direction_at(camera, {random.uniform(150, 1130), random.uniform(100, 620)});
+                return Rigid{table.rotation * held(random),
+                             random.uniform(400, 900) / norm(ray) * ray};
+            };
+            from = place();
+            to = {from.rotation * rotation_about({0, 0, 1}, random.uniform(-0.5, 0.5)) *
+                      rotation_about({1, 0, 0}, random.uniform(-0.5, 0.5)),
+                  from.translation + Vector3{random.uniform(-60, 60), random.uniform(-60, 60), 0}};
+        }
+        const double part = (i % 20) / 19.0;
+        Matrix3 turned;
+        for (int k = 0; k < 9; ++k)
+            turned.m[k] = (1 - part) * from.rotation.m[k] + part * to.rotation.m[k];
+        const Rigid truth{nearest_rotation(turned),
+                          (1 - part) * from.translation + part * to.translation};
+        const Rigid board{table.rotation, table * Point3{0, 120, 0} - Point3{}};
+        const double sigma = random.uniform(0.03, 0.4);
+        const double claimed = random.unit() < 0.1 ? 0.5 * sigma : sigma;
+        const double shown = random.unit();
+        seen.clear();
+        for (const int b : {0, 2}) {
+            const Rigid& pose = b == 0 ? truth : board;
+            const Point3 eye = inverse(pose) * Point3{};
+            for (const MarkerTag& tag : bodies[b].tags) {
+                const Vector3 towards = normalized(eye - tag.body_from_tag * Point3{});
+                if (dot(towards, tag.body_from_tag * Vector3{0, 0, 1}) < 0.34) continue;
+                if (b == 0 && random.unit() > shown) continue;
+                SeenTag one;
+                one.id = tag.id;
+                for (int k = 0; k < 8; ++k) one.whitening[9 * k] = 1 / claimed;
+                const std::array<Point3, 4> corners = tag_corners(tag);
+                for (int k = 0; k < 4; ++k) {
+                    project(camera, pose * corners[k] - Point3{}, one.corners[k], nullptr);
+                    one.corners[k].x += sigma * normal(), one.corners[k].y += sigma * normal();
+                }
+                seen.push_back(one);
+            }
+        }
+        if (!seen.empty() && random.unit() < 0.1)
+            for (Pixel& c : seen[random.below(seen.size())].corners) c.x += random.uniform(-4, 4);
+        const FollowerPicture picture = follower.follow(seen, {}, 0, i / 30.0);
+        const MarkerReading& reading = picture.tools[0];
+        ++run.pictures;
+        run.one_tag += reading.tags == 1, run.two_poses += reading.two_poses;
+        run.poor += reading.status == MarkerStatus::poor;
+        if (reading.status != MarkerStatus::good) continue;
+        ++run.good;
+        const Rigid held_so = inverse(board) * truth;
+        const Point3 tool = bodies[0].body_from_tool * Point3{};
+        const double off = distance(reading.world_from_body * tool, held_so * tool);
+        const double deg = kDegPerRad * rotation_angle(transpose(held_so.rotation) *
+                                                       reading.world_from_body.rotation);
+        run.worst_mm = std::max(run.worst_mm, off), run.worst_deg = std::max(run.worst_deg, deg);
+        run.far += off > kFarMm || deg > kFarDeg;
+    }
+    return run;
+}
+
+TEST_F(MarkerPose, NoPoseThatIsCalledGoodIsFarOff) {
+    const CornerRun run = run_of_corners(camera_, bodies_, 1500, 21);
+    EXPECT_EQ(run.far, 0) << run.worst_mm << " mm, " << run.worst_deg << " degrees";
+    EXPECT_GT(run.good, run.pictures / 4);
+    EXPECT_GT(run.one_tag, run.pictures / 20);
+    EXPECT_GT(run.two_poses, run.pictures / 20);
+}
+
+// SONOCASE_FRAMES=N: the same over N frames.
+TEST_F(MarkerPose, DISABLED_LongRunOfCorners) {
+    const char* text = std::getenv("SONOCASE_FRAMES");
+    const CornerRun run = run_of_corners(camera_, bodies_, text ? std::atoi(text) : 100000, 5);
+    std::printf(
+        "%d pictures: %d good, %d poor, %d of one tag, %d of two poses; good ones off by at "
+        "most %.2f mm, %.2f degrees; %d farther than 10 mm or 5 degrees\n",
+        run.pictures, run.good, run.poor, run.one_tag, run.two_poses, run.worst_mm, run.worst_deg,
+        run.far);
+    EXPECT_EQ(run.far, 0);
+}
+
+// SONOCASE_FRAMES=N: figures over N frames of each kind.
+TEST_F(MarkerPose, DISABLED_Figures) {
+    const char* text = std::getenv("SONOCASE_FRAMES");
+    const int frames = text ? std::atoi(text) : 300;
+    for (const auto& [name, body, low, high] :
+         {std::tuple{"probe .4-.9 m", 0, 400.0, 900.0}, std::tuple{"probe .6 m", 0, 599.0, 601.0},
+          std::tuple{"needle .4-.9 m", 1, 400.0, 900.0}}) {
+        const Errors e = SONOCASE_STILL(body, frames, low, high, 11);
+        std::printf(
+            "%s: %d frames, good %.1f %%, rms %.2f mm, %.3f deg, worst %.2f mm, %.2f deg, "
+            "within three sigma %.2f %%, chi2 %.2f\n",
+            name, e.frames, 100.0 * e.good / e.frames, e.rms_mm(), e.rms_deg(), e.worst_mm,
+            e.worst_deg, 100.0 * e.within / e.good, e.chi / e.good);
+    }
+}
+
+}  // namespace
+}  // namespace sonocase
