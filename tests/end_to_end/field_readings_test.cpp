@@ -146,8 +146,12 @@ TEST_F(FieldReadings, TwoClocksAreRefusedAndALateNeedleIsLostUntilItComes) {
         const double t = frame.timestamp_s - sequence->frames.front().timestamp_s;
         const bool ok = frame.poses[static_cast<std::size_t>(needle)].ok;
         // A reading counts for a frame within a step of the recording.
-        if (t < 7.8) EXPECT_FALSE(ok) << t;
-        if (t > 8.2 && t < 11.8) EXPECT_TRUE(ok) << t;
+        if (t < 7.8) {
+            EXPECT_FALSE(ok) << t;
+        }
+        if (t > 8.2 && t < 11.8) {
+            EXPECT_TRUE(ok) << t;
+        }
     }
 }
 

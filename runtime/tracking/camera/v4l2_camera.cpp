@@ -55,12 +55,12 @@ class V4l2Camera final : public PictureSource {
             if (errno == EACCES)
                 return Error{"This user may not use the camera.", path,
                              "add the user to the group video, and log in again"};
-            return Error{"No camera is connected.", "", path};
+            return Error{"No camera is connected", "", "connect one"};
         }
         v4l2_capability can{};
         if (control(file_, VIDIOC_QUERYCAP, &can) < 0 ||
             !(can.device_caps & V4L2_CAP_VIDEO_CAPTURE) || !(can.device_caps & V4L2_CAP_STREAMING))
-            return Error{"No camera is connected.", "", path};
+            return Error{"No camera is connected", "", "connect one"};
         name_.assign(reinterpret_cast<const char*>(can.card),
                      strnlen(reinterpret_cast<const char*>(can.card), sizeof can.card));
         if (Status done = choose_format(path); !done) return done;
@@ -194,7 +194,7 @@ class V4l2Camera final : public PictureSource {
 }  // namespace
 
 Result<std::unique_ptr<PictureSource>> open_v4l2_camera(int number) {
-    Error first{"No camera is connected.", "", "connect one"};
+    Error first{"No camera is connected", "", "connect one"};
     for (int n = std::max(0, number); n < (number < 0 ? kCameras : number + 1); ++n) {
         SONOCASE_TRY(GreyJpegReader reader, GreyJpegReader::create());
         auto camera = std::make_unique<V4l2Camera>(std::move(reader));

@@ -143,7 +143,7 @@ struct PlayedCamera {
     Result<std::unique_ptr<PictureSource>> open() {
         if (busy)
             return Error{"Another program uses the camera.", "/dev/video0", "close that program"};
-        if (!plugged) return Error{"No camera is connected.", "", ""};
+        if (!plugged) return Error{"No camera is connected", "", ""};
         return std::unique_ptr<PictureSource>(std::make_unique<Source>(*this));
     }
 };
@@ -175,7 +175,7 @@ TEST(CameraTracker, ALiveCameraMayComeGoAndBeTaken) {
             [&] { return tracker.health().message.find(words) != std::string::npos; });
     };
     EXPECT_TRUE(tracker.is_device());
-    EXPECT_TRUE(says("No camera is connected."));
+    EXPECT_TRUE(says("No camera is connected"));
     camera.busy = true;
     EXPECT_TRUE(says("Another program uses the camera."));
     camera.busy = false;
@@ -191,7 +191,7 @@ TEST(CameraTracker, ALiveCameraMayComeGoAndBeTaken) {
     const Point3 face{0, 0, -120};
     EXPECT_LT(distance(reading.sensors[kProbeSensor].world_from_sensor * face, truth * face), 1.5);
     camera.plugged = false;
-    EXPECT_TRUE(says("No camera is connected."));
+    EXPECT_TRUE(says("No camera is connected"));
     camera.plugged = true;
     const std::uint64_t before = reading.sequence;
     EXPECT_TRUE(

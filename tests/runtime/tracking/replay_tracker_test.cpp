@@ -105,8 +105,12 @@ TEST(ReplayTracker, ANeedleThatBeginsLaterIsLostUntilThen) {
         ASSERT_TRUE(replay.poll(replay.recorded_time_s(i), reading));
         EXPECT_EQ(reading.sensors[kProbeSensor].state, SensorState::ok);
         // Within one step of the recording.
-        if (i < 59) EXPECT_EQ(reading.sensors[kNeedleSensor].state, SensorState::lost) << i;
-        if (i >= 60) EXPECT_EQ(reading.sensors[kNeedleSensor].state, SensorState::ok) << i;
+        if (i < 59) {
+            EXPECT_EQ(reading.sensors[kNeedleSensor].state, SensorState::lost) << i;
+        }
+        if (i >= 60) {
+            EXPECT_EQ(reading.sensors[kNeedleSensor].state, SensorState::ok) << i;
+        }
     }
 }
 

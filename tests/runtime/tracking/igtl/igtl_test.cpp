@@ -512,7 +512,8 @@ TEST(IgtlTracker, AFloodTakesATenthOfACoreAndNoMemory) {
     endless.resize(igtl::kHeaderSize + 500000);
     Bytes many(14000 * 70, 0);
     for (std::size_t i = 0; i < many.size(); i += 70) {
-        std::snprintf(reinterpret_cast<char*>(&many[i]), 20, "T%zuToX", i);
+        const std::string name = "T" + std::to_string(i) + "ToX";
+        std::copy(name.begin(), name.end(), many.begin() + static_cast<std::ptrdiff_t>(i));
         std::copy(good.begin() + 58, good.end(),
                   many.begin() + static_cast<std::ptrdiff_t>(i) + 22);
     }
@@ -559,7 +560,9 @@ TEST(IgtlTracker, AFloodTakesATenthOfACoreAndNoMemory) {
         EXPECT_LT(spent_s, 0.1 * wall_s + 0.02 + 0.1);
         EXPECT_LT(woken - woken_before, 520 * wall_s);
         EXPECT_LT(resident_mb() - memory_before_mb, 30);
-        if (flood.comes) EXPECT_GT(tracker->health().readings, had);
+        if (flood.comes) {
+            EXPECT_GT(tracker->health().readings, had);
+        }
         tracker->set_wake({});
     }
 }
