@@ -206,7 +206,6 @@ void CameraTracker::stream(PictureSource& source) {
 Result<Recording> load_camera_video(const std::string& path, const CameraTrackerOptions& options) {
     SONOCASE_TRY(const JpegVideo video, load_jpeg_video(path));
     SONOCASE_TRY(GreyJpegReader reader, GreyJpegReader::create());
-    SONOCASE_TRY(TagDetector detector, TagDetector::create());
     Recording recording;
     recording.name = path;
     std::optional<PictureFollower> follower;
@@ -225,6 +224,7 @@ Result<Recording> load_camera_video(const std::string& path, const CameraTracker
             if (!follower) {
                 SONOCASE_TRY(const CameraModel camera,
                              model_for(options, picture.width_px, picture.height_px));
+                SONOCASE_TRY(TagDetector detector, TagDetector::create());
                 follower.emplace(std::move(detector),
                                  MarkerFollower(camera, marker_bodies(options.setup.markers)));
             }
