@@ -19,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/base/constants.h"
 #include "formats/base/geometry.h"
 #include "formats/base/result.h"
 
@@ -68,7 +69,7 @@ struct MarkerSizes {
 };
 
 inline constexpr int kBodySides = 7;
-inline constexpr double kSideLean_rad = 25 * 3.14159265358979323846 / 180;
+inline constexpr double kSideLean_rad = 25 * kRadPerDeg;
 inline constexpr int kBoardColumns = 4, kBoardRows = 5;
 
 // Errors: a size out of range; a ruler that is off by more than a tenth was measured wrongly.

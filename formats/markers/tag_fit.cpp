@@ -141,8 +141,8 @@ struct Sums {
 
 // The pixels under a tag and its margin, each with its grey value.
 struct Pixels {
-    static constexpr int kMost = 700;
-    std::array<float, kMost> x, y, grey;
+    static constexpr int kMax = 700;
+    std::array<float, kMax> x, y, grey;
     int count = 0;
 };
 
@@ -285,7 +285,7 @@ void choose_pixels(const GreyPicture& picture,
                 const float off_v = std::abs(v - std::floor(v + 0.5f));
                 if (std::min(off_u, off_v) > near || ++next % stride != 0) continue;
             }
-            if (out.count == Pixels::kMost) return;
+            if (out.count == Pixels::kMax) return;
             out.x[out.count] = static_cast<float>(x);
             out.y[out.count] = static_cast<float>(y);
             out.grey[out.count++] = row[x];

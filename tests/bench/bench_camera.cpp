@@ -47,7 +47,7 @@ struct Film {
     }
 };
 
-// The film runs to and fro, so that nothing leaps. good: the part of the tools' poses that are.
+// The film runs forward and back, so that no tool jumps. good: the share of poses that are good.
 void follow(benchmark::State& state, bool with_needle) {
     const Film film(with_needle);
     Result<GreyJpegReader> reader = GreyJpegReader::create();

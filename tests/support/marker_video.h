@@ -11,6 +11,7 @@
 #include <functional>
 #include <vector>
 
+#include "formats/base/constants.h"
 #include "formats/base/random.h"
 #include "formats/markers/camera_model.h"
 #include "formats/markers/marker_set.h"
@@ -76,7 +77,7 @@ class MarkerVideo {
         for (int y = 0; y < h; ++y) {
             const double row_s = time_s + options.readout_s * (static_cast<double>(y) / h - 0.5);
             const double light =
-                options.brightness * (1 + options.flicker * std::sin(2 * 3.14159265 * 100 * row_s));
+                options.brightness * (1 + options.flicker * std::sin(2 * kPi * 100 * row_s));
             std::size_t from = random_.below(noise_.size() - w);
             const float amplitude = static_cast<float>(options.noise_grey);
             for (int x = 0; x < w; ++x) {

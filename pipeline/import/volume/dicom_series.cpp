@@ -735,7 +735,7 @@ double scan_step_mm(const DicomObject& segmentation, std::vector<DicomSlice> sli
 
 // Whether the voxels are few different numbers, as those of labels are and those of a scan are not.
 bool hold_labels(const NativeVolume& volume) {
-    constexpr std::size_t kMostLabels = 160;  // a scan of 8 bits has some 250 different values
+    constexpr std::size_t kMaxLabels = 160;  // a scan of 8 bits has some 250 different values
     std::vector<bool> seen(1 << 16, false);
     std::size_t count = 0;
     const std::size_t bytes = bytes_of(volume.component);
@@ -745,7 +745,7 @@ bool hold_labels(const NativeVolume& volume) {
         std::memcpy(&value, volume.bytes.data() + at, bytes);
         if (seen[value]) continue;
         seen[value] = true;
-        if (++count > kMostLabels) return false;
+        if (++count > kMaxLabels) return false;
     }
     return true;
 }
