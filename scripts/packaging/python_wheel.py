@@ -3,12 +3,14 @@
 
 import base64
 import hashlib
+import os
 import pathlib
 import re
 import subprocess
 import sys
 import sysconfig
 import tempfile
+import time
 import zipfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -21,6 +23,13 @@ def _version():
 def _tag():
     python = f"cp{sys.version_info.major}{sys.version_info.minor}"
     return f"{python}-{python}-{re.sub('[-.]', '_', sysconfig.get_platform())}"
+
+
+def _moment():
+    """The commit's time, or SOURCE_DATE_EPOCH, as an archive notes it: the same commit gives the same wheel."""
+    epoch = os.environ.get("SOURCE_DATE_EPOCH") or subprocess.run(
+        ["git", "-C", ROOT, "log", "-1", "--format=%ct"], capture_output=True, text=True).stdout
+    return time.gmtime(int(epoch) if epoch.strip() else 315532800)[:6]  # without a clone: 1980, the first that a zip knows
 
 
 def _built(prefix, build):
@@ -74,12 +83,20 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
                 files[str(path.relative_to(package.parent))] = path.read_bytes()
         record = ""
         with zipfile.ZipFile(pathlib.Path(wheel_directory, name), "w", zipfile.ZIP_DEFLATED) as wheel:
+            moment = _moment()
+
+            def add(path, content):
+                entry = zipfile.ZipInfo(path, moment)
+                entry.compress_type = zipfile.ZIP_DEFLATED
+                entry.external_attr = 0o100644 << 16
+                wheel.writestr(entry, content)
+
             for path, content in files.items():
                 content = content.encode() if isinstance(content, str) else content
                 digest = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).decode().rstrip("=")
                 record += f"{path},sha256={digest},{len(content)}\n"
-                wheel.writestr(path, content)
-            wheel.writestr(f"{info}/RECORD", record + f"{info}/RECORD,,\n")
+                add(path, content)
+            add(f"{info}/RECORD", record + f"{info}/RECORD,,\n")
     return name
 
 

@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <string_view>
 
+#include "formats/files/atomic_file.h"
+#include "formats/files/load_save.h"
 #include "pipeline/import/volume/label_map.h"
 #include "pipeline/import/volume/native_volume.h"
 #include "support/temporary_folder.h"
@@ -60,6 +63,24 @@ TEST_F(DicomFolder, IsReadInAnyFileOrder) {
     }
     EXPECT_TRUE(std::none_of(result->report.warnings.begin(), result->report.warnings.end(),
                              [](const std::string& w) { return w.find("DICOM") < w.size(); }));
+}
+
+// Who is in the scan stays in the scan: neither the map nor the report repeats it.
+TEST_F(DicomFolder, ThatNamesItsPatientLeavesNoTraceOfTheName) {
+    declared_.person = "DOE^JANE";
+    write_all();
+    const auto result = imported();
+    ASSERT_TRUE(result) << result.error().message();
+    std::string told;
+    for (const std::string& warning : result->report.warnings) told += warning;
+    for (const Note& note : result->report.notes) told += note.name + note.text;
+    for (const Label& label : result->labels.labels) told += label.name;
+    EXPECT_EQ(told.find("DOE"), std::string::npos) << told;
+    ASSERT_TRUE(save_label_file({"ct", result->labels, {}, {}, {}}, folder_ / "map.labels"));
+    const auto bytes = read_file(folder_ / "map.labels");
+    ASSERT_TRUE(bytes);
+    const std::string_view name = "DOE";
+    EXPECT_EQ(std::search(bytes->begin(), bytes->end(), name.begin(), name.end()), bytes->end());
 }
 
 // Slices 0.7 mm apart do not lie at whole numbers, and scanners round their positions.

@@ -279,6 +279,13 @@ std::string dicom_slice(const TinyVolume& volume,
     const double sx = norm(x), sy = norm(y);
     bytes += element(8, 0x16, "UI", ct) + element(8, 0x18, "UI", instance) +
              element(8, 0x60, "CS", "CT");
+    if (!counts.person.empty()) {
+        for (const int number : {0x80, 0x1030, 0x103e})  // institution, study, series
+            bytes += element(8, static_cast<std::uint16_t>(number), "LO", counts.person);
+        bytes += element(0x10, 0x10, "PN", counts.person) +
+                 element(0x10, 0x20, "LO", counts.person) +
+                 element(0x10, 0x4000, "LT", counts.person);
+    }
     bytes += element(0x18, 0x50, "DS",
                      !counts.thickness.empty() ? counts.thickness
                                                : numbers({norm(volume.columns.column(2))}, ""));

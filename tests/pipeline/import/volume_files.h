@@ -56,6 +56,7 @@ struct DicomCounts {
     std::string position, thickness;        // texts instead of the true ones
     int stored_bits = 16;                   // the upper bits of each pixel are set if fewer
     bool is_signed = false;
+    std::string person;  // in every element that names or describes the patient; empty: none
 };
 // One slice of an uncompressed DICOM series of unsigned 16-bit values, explicit little-endian.
 std::string dicom_slice(const TinyVolume& volume,
