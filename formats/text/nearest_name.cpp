@@ -50,4 +50,16 @@ std::string suggest_name(std::string_view name, std::span<const std::string> can
     return list;
 }
 
+std::string unknown_option(std::span<const std::string> words, std::span<const std::string> known) {
+    for (const std::string& word : words) {
+        if (word == "--") return {};  // what follows are no options
+        if (word.size() < 3 || !word.starts_with("--")) continue;
+        const std::string name = word.substr(0, word.find('='));
+        if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+        const std::string nearest = nearest_name(name, known);
+        return name + " is no option" + (nearest.empty() ? "" : "; did you mean " + nearest + "?");
+    }
+    return {};
+}
+
 }  // namespace sonocase

@@ -22,4 +22,9 @@ std::string nearest_name(std::string_view name, std::span<const std::string> can
 // "did you mean 'x'?" or, without a near name, "valid here: a, b, c".
 std::string suggest_name(std::string_view name, std::span<const std::string> candidates);
 
+// The first word of a command line that looks like an option and is none of `known` ("--labels"):
+// "--lables is no option; did you mean --labels?", else empty. A parser names what is missing
+// first, which helps nobody who mistyped its name.
+std::string unknown_option(std::span<const std::string> words, std::span<const std::string> known);
+
 }  // namespace sonocase

@@ -98,7 +98,7 @@ struct AnatomyReport {
 
 struct AnatomyOptions {
     bool mesh = false;  // what to advise: --axes rather than --orientation
-    double margin = 2;  // of a finding, > 0
+    double margin = 3;  // of a finding, > 0
 };
 
 AnatomyReport check_anatomy(const BodySummary& body, const AnatomyOptions& options = {});

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <span>
 #include <vector>
 
 #include <unistd.h>
@@ -12,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/files/atomic_file.h"
+#include "formats/text/nearest_name.h"
 
 namespace sonocase::pipeline::inline verbs {
 
@@ -103,7 +105,11 @@ std::optional<int> parse_command_line(CLI::App& app, int argc, char** argv) {
     } catch (const CLI::CallForAllHelp& call) {
         return app.exit(call);
     } catch (const CLI::ParseError& error) {
-        return wrong_usage(verb.c_str(), error.what());
+        std::vector<std::string> known;
+        for (const CLI::Option* option : app.get_options())
+            for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+        const std::string unknown = unknown_option(std::span(words).subspan(1), known);
+        return wrong_usage(verb.c_str(), unknown.empty() ? error.what() : unknown);
     }
     note_new_folders(verb, app);
     return std::nullopt;

@@ -9,11 +9,13 @@
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <unistd.h>
 #include <CLI/CLI.hpp>
 
 #include "formats/base/build_facts.h"
+#include "formats/text/nearest_name.h"
 #include "runtime/player/headless/make_dataset.h"
 #include "runtime/player/headless/run_headless.h"
 #include "runtime/player/session/arguments.h"
@@ -129,6 +131,17 @@ struct DopplerOptions {
     CLI::Option *angle = nullptr, *steer = nullptr;
 };
 
+int wrong_usage(const CLI::App& app, const std::string& what, int argc, char** argv) {
+    const std::vector<std::string> words(argv + 1, argv + argc);
+    std::vector<std::string> known;
+    for (const CLI::Option* option : app.get_options())
+        for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+    const std::string unknown = unknown_option(words, known);
+    std::fprintf(stderr, "sonoplay: %s; %s --help lists the options\n",
+                 unknown.empty() ? what.c_str() : unknown.c_str(), app.get_name().c_str());
+    return 2;
+}
+
 }  // namespace
 
 int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exit_now) {
@@ -232,8 +245,7 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
     } catch (const CLI::ParseError& e) {
         exit_now = true;
         if (e.get_exit_code() == 0) return app.exit(e);
-        std::fprintf(stderr, "sonoplay: %s; sonoplay --help lists the options\n", e.what());
-        return 2;
+        return wrong_usage(app, e.what(), argc, argv);
     }
     if (!size.empty()) {
         int w = 0, h = 0;
@@ -278,8 +290,7 @@ int run_dataset_command(int argc, char** argv) {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& e) {
         if (e.get_exit_code() == 0) return app.exit(e);
-        std::fprintf(stderr, "sonoplay: %s; sonoplay dataset --help lists the options\n", e.what());
-        return 2;
+        return wrong_usage(app, e.what(), argc, argv);
     }
     char extra = 0;
     if (std::sscanf(shard.c_str(), "%d/%d%c", &arguments.shard, &arguments.shards, &extra) != 2 ||

@@ -36,5 +36,14 @@ TEST(SuggestName, NamesTheNearestOrAllValidOnes) {
     EXPECT_EQ(suggest_name("mannequin", names), "valid here: labels, surface");
 }
 
+TEST(SuggestName, TheMistypedOptionIsNamed) {
+    const std::vector<std::string> known{"--labels", "--out", "-o", "--mesh"};
+    const auto of = [&](std::vector<std::string> words) { return unknown_option(words, known); };
+    EXPECT_EQ(of({"--lables", "x"}), "--lables is no option; did you mean --labels?");
+    EXPECT_EQ(of({"--out=a", "--voxel=3"}), "--voxel is no option");
+    EXPECT_EQ(of({"--labels", "--", "--lables"}), "");
+    EXPECT_EQ(of({"-5", "-o", "--mesh"}), "");
+}
+
 }  // namespace
 }  // namespace sonocase

@@ -58,6 +58,9 @@ TEST(CommandLine, WrongUsageIsStatusTwoWithTheNearestVerb) {
     const CommandResult option = sonocase_run("build --colour blue", folder);
     EXPECT_EQ(option.status, 2);
     EXPECT_EQ(lines(option.error), 1) << option.error;
+    const CommandResult mistyped = sonocase_run("import --tabel names.csv", folder);
+    EXPECT_NE(mistyped.error.find("--tabel is no option; did you mean --table?"), std::string::npos)
+        << mistyped.error;
     EXPECT_EQ(sonocase_run("import a.nii", folder).status, 2);  // no -o
     EXPECT_EQ(sonocase_run("build --threads -3", folder).status, 2);
     EXPECT_TRUE(folder.names().empty());
