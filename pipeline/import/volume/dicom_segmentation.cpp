@@ -540,6 +540,43 @@ void paint_segments(const Object& object,
                                   "time?");
 }
 
+// Segments of a FRACTIONAL object whose values all lie below half: written as 0 and 1 of 255, say.
+Status expect_halves(const Object& object,
+                     const Pixels& pixels,
+                     int maximum,
+                     const std::string& path,
+                     std::vector<std::string>& warnings) {
+    const auto largest_of = [&](const Segment& segment) {
+        int largest = 0;
+        for (const int frame : segment.frames) {
+            const std::uint8_t* values =
+                pixels.bytes + static_cast<std::size_t>(frame) * pixels.frame_step;
+            const std::uint8_t* end = values + object.frame_pixels();
+            largest = std::max<int>(largest, values == end ? 0 : *std::max_element(values, end));
+        }
+        return largest;
+    };
+    int largest = 0;
+    bool any_inside = false;
+    for (const Segment& segment : object.segments) {
+        any_inside = any_inside || segment.voxels > 0;
+        if (segment.voxels > 0) continue;
+        const int value = largest_of(segment);
+        if (value > 0)
+            warnings.push_back(text("no voxel of '%s' reaches half of %d; its largest value is %d",
+                                    segment.name.c_str(), maximum, value));
+        largest = std::max(largest, value);
+    }
+    if (any_inside || largest == 0) return Done{};
+    return Error{
+        text("no voxel of the FRACTIONAL segmentation reaches half of its "
+             "MaximumFractionalValue %d: the largest value is %d",
+             maximum, largest),
+        path,
+        text("expected values up to %d; a file of 0 and %d needs MaximumFractionalValue %d",
+             maximum, largest, largest)};
+}
+
 template <class Pixel, class T>
 void paint_labelmap(const Object& object,
                     const FramePlaces& where,
@@ -712,6 +749,9 @@ Result<NativeVolume> read_object(const std::string& path,
             paint_segments<std::uint16_t>(object, where, pixels, maximum, volume, segments);
         else
             paint_segments<std::uint8_t>(object, where, pixels, maximum, volume, segments);
+        if (object.kind == Kind::fractional) {
+            SONOCASE_TRY_DONE(expect_halves(object, pixels, maximum, path, volume.warnings));
+        }
     }
     add_fields(object, path, volume);
     return volume;

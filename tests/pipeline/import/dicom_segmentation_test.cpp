@@ -176,6 +176,18 @@ TEST_F(DicomSegmentation, OfFractionsIsInsideFromHalfOn) {
     EXPECT_NE(note(result, "fractional").find("from 50 of 100"), std::string::npos);
 }
 
+// A writer that took 0 and 1 for fractions of 255.
+TEST_F(DicomSegmentation, OfFractionsThatNowhereReachHalfIsRefusedByTheLargest) {
+    object_.kind = "FRACTIONAL";
+    object_.inside = 1;
+    const auto result = imported();
+    ASSERT_FALSE(result);
+    const std::string message = result.error().message();
+    EXPECT_NE(message.find("MaximumFractionalValue 255: the largest value is 1"), std::string::npos)
+        << message;
+    EXPECT_NE(message.find("needs MaximumFractionalValue 1"), std::string::npos) << message;
+}
+
 TEST_F(DicomSegmentation, WithSegmentsThatOverlapGivesVoxelsToTheSmaller) {
     object_.segments = {{1, "kidney right", {kLiver, kSpleen, kKidneyRight}, ""},
                         {2, "liver", {kLiver}, ""},
