@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <ratio>
 #include <sstream>
 
 #include "formats/base/digest.h"
@@ -165,7 +167,7 @@ CacheSummary StageCache::trim() const {
     return summary;
 }
 
-CacheSummary StageCache::tidy(bool verify) const {
+CacheSummary StageCache::tidy(bool verify, double longest_days) const {
     if (!enabled()) return {};
     const std::size_t leftovers = remove_leftovers(folder_);
     std::size_t damaged = 0;
@@ -179,7 +181,17 @@ CacheSummary StageCache::tidy(bool verify) const {
             // Verifying an entry does not count as using it.
             if (!bad) fs::last_write_time(item.path, item.used, code);
         }
+    std::size_t old = 0;
+    if (longest_days > 0) {
+        const std::chrono::duration<double, std::ratio<86400>> longest(longest_days);
+        for (const Item& item : entries_of(folder_)) {
+            std::error_code code;
+            if (fs::file_time_type::clock::now() - item.used > longest)
+                old += fs::remove(item.path, code) ? 1 : 0;
+        }
+    }
     CacheSummary summary = trim();
+    summary.old = old;
     summary.leftovers = leftovers;
     summary.damaged = damaged;
     return summary;

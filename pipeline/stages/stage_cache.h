@@ -31,6 +31,7 @@ struct CacheSummary {
     std::size_t entries = 0;    // remaining
     std::uint64_t bytes = 0;    // of the remaining entries
     std::size_t evicted = 0;    // removed for the limit
+    std::size_t old = 0;        // removed, since nobody used them for long
     std::size_t damaged = 0;    // removed; only with `verify`
     std::size_t leftovers = 0;  // files of killed writers, removed
 };
@@ -53,8 +54,9 @@ class StageCache {
     std::optional<std::string> digest_in(const std::string& stage, const std::string& key) const;
     Status store(const std::string& stage, const std::string& key, const CacheEntry& entry) const;
 
-    // Removes leftovers, with `verify` also damaged entries, and what passes the limit.
-    CacheSummary tidy(bool verify) const;
+    // Removes leftovers, with `verify` also damaged entries, entries that were not used for
+    // longest_days (0: any time), and what passes the limit.
+    CacheSummary tidy(bool verify, double longest_days = 0) const;
 
     std::string path_of(const std::string& stage, const std::string& key) const;
 

@@ -58,6 +58,7 @@ int verb_cache(int argc, char** argv) {
     CLI::App app("Tidy a folder of finished stage results; other programs may be using it");
     std::string folder;
     double limit_mb = 0;
+    double longest_days = 0;
     bool verify = false;
     app.add_option("DIR", folder, "The folder given to build as --cache")
         ->required()
@@ -66,13 +67,18 @@ int verb_cache(int argc, char** argv) {
                    "Remove what has not been used for longest; 0 means no limit")
         ->check(CLI::NonNegativeNumber)
         ->type_name("MB");
+    app.add_option("--older-than", longest_days,
+                   "Remove what has not been used for so many days; 0 means any time")
+        ->check(CLI::NonNegativeNumber)
+        ->type_name("DAYS");
     app.add_flag("--verify", verify, "Read every entry and remove the damaged ones");
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
     const StageCache cache(folder, static_cast<std::uint64_t>(limit_mb * 1e6));
-    const CacheSummary summary = cache.tidy(verify);
+    const CacheSummary summary = cache.tidy(verify, longest_days);
     std::printf("%zu entries, %.1f MB; removed: %zu over the limit, %zu left by killed writers",
                 summary.entries, static_cast<double>(summary.bytes) / 1e6, summary.evicted,
                 summary.leftovers);
+    if (longest_days > 0) std::printf(", %zu not used for %g days", summary.old, longest_days);
     if (verify) std::printf(", %zu damaged", summary.damaged);
     std::printf("\n");
     return kDone;

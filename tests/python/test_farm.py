@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Data sets rendered by the farm, on this machine: the same bytes, and what fails is said."""
 
+import json
 import pathlib
 import shutil
 import subprocess
@@ -42,6 +43,36 @@ def test_a_second_try_asks_by_what_the_first_took(tmp_path, monkeypatch):
     (tmp_path / "logs" / "case").mkdir(parents=True)
     (tmp_path / "logs" / "case" / "import.peak").write_text("1461\n")
     assert names["memory_mb"]("case", "import", 2) == 2191
+
+
+def test_the_page_says_what_is_faulty_what_failed_why_and_what_it_cost(tmp_path):
+    stages = [{"stage": "warp", "key": "a" * 32}, {"stage": "pack", "key": "b" * 32}]
+    names = ["good", "faulty", "unlooked", "stuck-1", "stuck-2"]
+    plan = {"cases": [{"name": name, "recipe": name, "stages": stages} for name in names]}
+    (tmp_path / "plan.json").write_text(json.dumps(plan))
+    for folder in ("cases", "checks"):
+        (tmp_path / folder).mkdir()
+    work = [{"stage": "warp", "seconds": 30}, {"stage": "pack", "seconds": 2}]
+    for name in names[:3]:
+        (tmp_path / "state" / name).mkdir(parents=True)
+        for stage in stages:
+            report = {"digest": name, "stages": work, "warnings": [], "peak_mb": 1}
+            (tmp_path / "state" / name / f"{stage['stage']}.{stage['key']}.json").write_text(json.dumps(report))
+        (tmp_path / "cases" / f"{name}.sonocase").touch()
+    fault = {"name": "sides", "what": "liver on the left", "remedy": "turn the map"}
+    for name, faults in (("good", []), ("faulty", [fault])):
+        said = {"faults": faults, "remarks": ["small"]}
+        (tmp_path / "checks" / f"{name}.{'b' * 32}.json").write_text(json.dumps(said))
+    for name in names[3:]:
+        (tmp_path / "logs" / name).mkdir(parents=True)
+        (tmp_path / "logs" / name / "warp.log").write_text(f"== now\nsonocase build: {name}.nii: no such file\n")
+    done = subprocess.run([FARM / "index-page", tmp_path], capture_output=True, text=True)
+    assert done.returncode == 1 and "1 with faults" in done.stdout
+    page = (tmp_path / "index.html").read_text()
+    assert "liver on the left: turn the map" in page and "no fault, 1 to note" in page
+    assert page.count("not looked over") == 1
+    assert "<b>2</b>: warp: sonocase build: CASE.nii: no such file" in page
+    assert "Work in them: 96 s (warp 90, pack 6)" in page
 
 
 @needs_snakemake

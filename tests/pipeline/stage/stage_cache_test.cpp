@@ -159,6 +159,24 @@ TEST(StageCache, TidyRemovesDamagedEntriesAndKeepsTheRest) {
     EXPECT_FALSE(std::filesystem::exists(cache.path_of("warp", other)));
 }
 
+TEST(StageCache, WhatNobodyUsedForLongGoesAndWhatIsUsedStays) {
+    const TemporaryFolder folder;
+    const StageCache cache(folder.path());
+    const auto key = [](char first) { return first + std::string(kKey).substr(1); };
+    for (const char first : {'a', 'b', 'c'}) {
+        ASSERT_TRUE(cache.store("s", key(first), entry_of("some")));
+        std::filesystem::last_write_time(
+            cache.path_of("s", key(first)),
+            std::filesystem::file_time_type::clock::now() - std::chrono::hours(24 * 10));
+    }
+    ASSERT_TRUE(cache.find("s", key('b'), nullptr).has_value());  // used now
+    EXPECT_EQ(cache.tidy(false, 11).old, 0u);
+    const CacheSummary summary = cache.tidy(true, 9);  // verifying is no use
+    EXPECT_EQ(summary.old, 2u);
+    EXPECT_EQ(summary.entries, 1u);
+    EXPECT_TRUE(cache.find("s", key('b'), nullptr).has_value());
+}
+
 // Processes, not threads: what a farm's machines do to a folder that they share.
 class ManyProcesses {
   public:
