@@ -137,6 +137,24 @@ TEST(CommandLine, ScoresARecordingOfAnotherTrainerAgainstItsTissueMesh) {
     EXPECT_NEAR(metrics["deepest_mm"].get<double>(), 5, 1e-9);
 }
 
+// What inspect says and draws of the accuracy of a case.
+TEST(CommandLine, InspectDrawsTheAccuracyOfACase) {
+    const TemporaryFolder folder;
+    folder.write("case.toml", kTinyRecipe);
+    ASSERT_EQ(sonocase_run("build case.toml -o tiny.sonocase", folder).status, 0);
+    const CommandResult said =
+        sonocase_run("inspect tiny.sonocase --accuracy --picture a.svg", folder);
+    ASSERT_EQ(said.status, 0) << said.error;
+    EXPECT_NE(said.out.find("where its millimetres come from"), std::string::npos) << said.out;
+    EXPECT_NE(said.out.find("as it is"), std::string::npos) << said.out;
+    EXPECT_NE(read_text(folder / "a.svg").find("<svg"), std::string::npos);
+    EXPECT_EQ(sonocase_run("inspect tiny.sonocase --picture a.gif", folder).status, 1);
+    EXPECT_EQ(sonocase_run("inspect tiny.sonocase --accuracy --json", folder).status, 2);
+    // The page of check has the same picture.
+    sonocase_run("check tiny.sonocase -o page.html", folder);
+    EXPECT_NE(read_text(folder / "page.html").find("<h2>Accuracy</h2>"), std::string::npos);
+}
+
 TEST(CommandLine, BuildInspectValidateAndExportATinyCase) {
     const TemporaryFolder folder;
     folder.write("case.toml", kTinyRecipe);
