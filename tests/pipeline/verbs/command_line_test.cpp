@@ -137,6 +137,23 @@ TEST(CommandLine, ScoresARecordingOfAnotherTrainerAgainstItsTissueMesh) {
     EXPECT_NEAR(metrics["deepest_mm"].get<double>(), 5, 1e-9);
 }
 
+#ifndef __SANITIZE_ADDRESS__  // which takes memory of its own
+// The farm and --memory-mb trust what is said before a build. Bytes, unlike seconds, do not depend
+// on what else the machine does.
+TEST(CommandLine, ABuildTakesTheMemoryThatWasSaid) {
+    const TemporaryFolder folder;
+    folder.write("case.toml",
+                 "name = \"neck\"\nexercises = []\n[analytic]\nbody = \"neck\"\nneck_seed = 7\n"
+                 "voxel_mm = 0.75\nslice_mm = 1\nknown_map = true\n[resample]\nvoxel_mm = 1.5\n");
+    const CommandResult build =
+        sonocase_run("build case.toml -o neck.sonocase --report r.json --threads 2", folder);
+    ASSERT_EQ(build.status, 0) << build.error;
+    const auto report = nlohmann::json::parse(read_text(folder / "r.json"));
+    const double said = report["expected"]["memory_mb"], took = report["peak_mb"];
+    EXPECT_NEAR(said / took, 1, 0.2) << said << " MB said, " << took << " taken";
+}
+#endif
+
 // What inspect says and draws of the accuracy of a case.
 TEST(CommandLine, InspectDrawsTheAccuracyOfACase) {
     const TemporaryFolder folder;
