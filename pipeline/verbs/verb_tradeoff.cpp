@@ -71,6 +71,7 @@ std::vector<NamedSuite> suites() {
         {"calibrate", calibrate_suite},
         {"look", look_suite},
         {"render", render_suite},
+        {"effects", effects_suite},
         {"linear", linear_suite},
         {"region", region_suite},
         {"pathology", pathology_suite},
