@@ -25,6 +25,7 @@
 #include <vector>
 
 #include "formats/bundle/case_bundle.h"
+#include "pipeline/export/error_budget.h"
 
 namespace sonocase::pipeline::inline check {
 
@@ -67,8 +68,11 @@ struct CheckResult {
 // Cost: 1 to 10 s.
 CheckResult check_case(const CaseBundle& bundle);
 
-// One page that opens in any browser, pictures inside.
-std::string check_page(const CaseBundle& bundle, const CheckResult& result);
+// One page that opens in any browser, pictures inside. points: what seconds buy in this case, of
+// case_points() (pipeline/tradeoff/choose_settings.h); empty: the page does not say.
+std::string check_page(const CaseBundle& bundle,
+                       const CheckResult& result,
+                       const std::vector<CasePoint>& points = {});
 
 // {"case", "faults": [{"name", "what", "remedy"}], "remarks", "organs", "targets", "exercises",
 // "ribs": {"right", "left"}}.

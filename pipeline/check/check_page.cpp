@@ -10,6 +10,7 @@
 #include "formats/text/number_text.h"
 #include "pipeline/check/case_labels.h"
 #include "pipeline/check/check_case.h"
+#include "pipeline/export/accuracy_picture.h"
 #include "pipeline/export/error_budget.h"
 #include "pipeline/pictures/markup.h"
 #include "pipeline/pictures/png.h"
@@ -238,6 +239,14 @@ std::string unknown_part(const CaseBundle& bundle) {
                                      {"rows", rows}});
 }
 
+// Where the millimetres of the case come from.
+std::string accuracy_part(const CaseBundle& bundle, const std::vector<CasePoint>& points) {
+    const CaseAccuracy accuracy = case_accuracy(bundle, points);
+    if (accuracy.budget.entries.empty()) return "";
+    return html().filled("accuracy", {{"svg", accuracy_svg(accuracy)},
+                                      {"known", number_text(accuracy.budget.known_mm, 3)}});
+}
+
 std::string faults_part(const CheckResult& result) {
     if (result.faults.empty()) return html().filled("no_fault", {});
     std::string rows;
@@ -295,7 +304,9 @@ std::string organ_rows(const CheckResult& result) {
 
 }  // namespace
 
-std::string check_page(const CaseBundle& bundle, const CheckResult& result) {
+std::string check_page(const CaseBundle& bundle,
+                       const CheckResult& result,
+                       const std::vector<CasePoint>& points) {
     std::string remarks;
     for (const std::string& remark : result.remarks)
         remarks += html().filled("remark", {{"text", escaped_html(remark)}});
@@ -305,6 +316,7 @@ std::string check_page(const CaseBundle& bundle, const CheckResult& result) {
         {{"case", escaped_html(bundle.manifest.case_name)},
          {"faults", faults_part(result)},
          {"planes", planes(bundle, own_colours(bundle))},
+         {"accuracy", accuracy_part(bundle, points)},
          {"unknown", unknown_part(bundle)},
          {"views", views(bundle, result)},
          {"ribs_right", std::to_string(result.ribs_right)},

@@ -43,10 +43,12 @@ struct BuildTime {
 };
 
 // Estimates the time by a law fitted to builds of two cases (docs/accuracy.md has the table):
-//     processor_s = speed * (a + t (edge / 64)^3 + b (C + R) + c C^(2/3) + d (V - 3) + m M)
+//     processor_s = speed * (a + t (edge / 64)^3 + b (C + R) + c C^(2/3) + d (V - 3) + m M
+//                            + (l L + p P) C)
 // C, R, V, M millions of voxels, cooked, of the region, of the label map (V counts where it exceeds
-// 3, and less beyond 30) and of a map that organ meshes become; edge of the textures. A fit that
-// needs the elastic warp takes some 3 s more, which is not known beforehand.
+// 3, and less beyond 30) and of a map that organ meshes become; edge of the textures; L lesions, P
+// pools of free fluid. A fit that needs the elastic warp takes some 3 s more, which is not known
+// beforehand.
 //
 // speed: machine_speed(); threads: 0 for all cores.
 BuildTime build_time(const CaseSize& size, int texture_edge, double speed, int threads);

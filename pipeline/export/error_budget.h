@@ -35,6 +35,15 @@ struct NextStep {
     double more_seconds = 0;  // > 0, on the machine of the sweep; of landmarks 0
 };
 
+// What the case's error would be with another setting, and what that would take: both of this case.
+struct CasePoint {
+    std::string setting;      // "resample.voxel_mm=1"
+    double error_mm = 0;      // known part of its budget
+    double more_seconds = 0;  // than the case as it is, on the machine of the sweep
+    bool present = false;     // the case as it is
+    bool landmarks = false;   // two landmarks far apart, everything else as it is
+};
+
 // How far from its true place a structure may lie on the mannequin, by what the fit reports.
 struct UnknownPlace {
     std::string label;

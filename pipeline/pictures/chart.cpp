@@ -319,8 +319,12 @@ Status write_chart_png(const ChartSheet& sheet, const std::string& path) {
     return write_file(path, std::span<const std::uint8_t>(png));
 }
 
+std::string chart_svg(const ChartSheet& sheet) {
+    return drawn(sheet).svg();
+}
+
 Status write_chart_svg(const ChartSheet& sheet, const std::string& path) {
-    return write_file(path, std::string_view(drawn(sheet).svg()));
+    return write_file(path, std::string_view(chart_svg(sheet)));
 }
 
 }  // namespace sonocase::pipeline::inline pictures

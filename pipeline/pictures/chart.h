@@ -52,6 +52,7 @@ struct ChartSheet {
 // Written under a temporary name and renamed. Error: the file cannot be written. Cost: about 10 ms
 // per chart.
 Status write_chart_png(const ChartSheet& sheet, const std::string& path);
+std::string chart_svg(const ChartSheet& sheet);
 Status write_chart_svg(const ChartSheet& sheet, const std::string& path);
 
 }  // namespace sonocase::pipeline::inline pictures

@@ -161,8 +161,10 @@ struct CaseSize {
     double cooked_voxels = 0;  // millions, without those of a region
     // Millions of nodes between thick slices that are interpolated; 0: none are.
     double interpolated_nodes = 0;
-    double region_voxels = 0;  // millions
-    double mesh_voxels = 0;    // those of label_voxels that organ meshes become
+    double region_voxels = 0;       // millions
+    double mesh_voxels = 0;         // those of label_voxels that organ meshes become
+    double lesions = 0, pools = 0;  // numbers of pathologies: of a place, and of free fluid
+    double surface_share = 1;  // surfaces of the map for its voxels, over those of a torso, [0, 1]
 };
 
 // Cores that a stage's job asks a build farm for, and its peak memory in MB: base + a * MB of the
@@ -178,6 +180,7 @@ struct StageCost {
     double per_interpolated_node = 0;  // beside base_mb and no other, up to ten million nodes
     double per_region_voxel = 0;
     double per_mesh_voxel = 0;
+    double per_pool_voxel = 0;  // beside per_cooked_voxel, where free fluid is painted
 
     int memory_mb(const CaseSize& size) const;
     int min_memory_mb(const CaseSize& size) const;  // what suffices where memory is short

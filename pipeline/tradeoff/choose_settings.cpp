@@ -164,51 +164,88 @@ Choice choose_settings(const FrontTable& table,
     return choice;
 }
 
+namespace {
+
+double measure_of(std::span<const StageReport> stages, const char* stage, const char* name) {
+    for (const StageReport& report : stages)
+        for (const Measure& m : report.measures)
+            if (report.stage == stage && m.name == name) return m.value;
+    return 0;
+}
+
+// The error of the same case with one measure changed; NaN where it has none of that name.
+double error_with(std::span<const StageReport> stages,
+                  const char* stage,
+                  const char* measure,
+                  double value) {
+    std::vector<StageReport> other(stages.begin(), stages.end());
+    bool found = false;
+    for (StageReport& report : other)
+        for (Measure& m : report.measures) {
+            if (report.stage != stage || m.name != measure) continue;
+            m.value = value;
+            found = true;
+        }
+    return found ? error_budget(other).known_mm : NAN;
+}
+
+constexpr const char* kTwoLandmarks = "two landmarks far apart";
+
+}  // namespace
+
+std::vector<CasePoint> case_points(const FrontTable& table,
+                                   std::span<const StageReport> stages,
+                                   double volume_mm3) {
+    std::vector<CasePoint> points;
+    const double now_mm = error_budget(stages).known_mm;
+    const double voxel_mm = measure_of(stages, stage_names::kResample, "voxel_mm");
+    if (voxel_mm > 0) {
+        std::vector<double> edges{voxel_mm};
+        for (const FrontRow& row : table.rows) edges.push_back(voxel_mm_of(row.settings));
+        std::sort(edges.begin(), edges.end());
+        edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+        const auto voxels_of = [&](double h) { return volume_mm3 / (h * h * h); };
+        const double per_voxel_s = fit_cost_model(table).per_voxel_s;
+        for (const double h : edges)
+            points.push_back({"resample.voxel_mm=" + number_text(h, 3),
+                              error_with(stages, stage_names::kResample, "voxel_mm", h),
+                              per_voxel_s * (voxels_of(h) - voxels_of(voxel_mm)), h == voxel_mm});
+    } else {
+        points.push_back({"as it is", now_mm, 0, true});
+    }
+    const double held = measure_of(stages, stage_names::kWarp, "interior_with_two_landmarks_mm");
+    if (held > 0)
+        points.push_back({kTwoLandmarks,
+                          error_with(stages, stage_names::kWarp, "predicted_interior_mm", held), 0,
+                          false, true});
+    std::stable_sort(points.begin(), points.end(), [](const CasePoint& a, const CasePoint& b) {
+        return a.more_seconds < b.more_seconds;
+    });
+    return points;
+}
+
 NextStep next_step(const FrontTable& table,
                    std::span<const StageReport> stages,
                    double volume_mm3) {
     const double now_mm = error_budget(stages).known_mm;
     NextStep step;
     step.error_from_mm = now_mm;
-    // The same case with one measure changed; NaN where it has none of that name.
-    const auto changed = [&](const char* stage, const char* measure, double value) {
-        std::vector<StageReport> other(stages.begin(), stages.end());
-        bool found = false;
-        for (StageReport& report : other)
-            for (Measure& m : report.measures) {
-                if (report.stage != stage || m.name != measure) continue;
-                m.value = value;
-                found = true;
-            }
-        return found ? error_budget(other).known_mm : NAN;
-    };
-    const auto measure = [&](const char* stage, const char* name) {
-        for (const StageReport& report : stages)
-            for (const Measure& m : report.measures)
-                if (report.stage == stage && m.name == name) return m.value;
-        return 0.0;
-    };
-    const double held = measure(stage_names::kWarp, "interior_with_two_landmarks_mm");
-    if (held > 0) {
-        step.error_to_mm = changed(stage_names::kWarp, "predicted_interior_mm", held);
-        step.step = "two landmarks far apart (--landmarks FILE.csv)";
-        if (step.error_to_mm < (1 - kSame) * now_mm) return step;
+    const std::vector<CasePoint> points = case_points(table, stages, volume_mm3);
+    for (const CasePoint& point : points) {
+        if (!point.landmarks || !(point.error_mm < (1 - kSame) * now_mm)) continue;
+        step.error_to_mm = point.error_mm;
+        step.step = std::string(kTwoLandmarks) + " (--landmarks FILE.csv)";
+        return step;
     }
-    const double voxel_mm = measure(stage_names::kResample, "voxel_mm");
-    double next_mm = 0;
-    for (const FrontRow& row : table.rows) {
-        const double finer = voxel_mm_of(row.settings);
-        if (finer < voxel_mm && finer > next_mm &&
-            changed(stage_names::kResample, "voxel_mm", finer) < (1 - kSame) * now_mm)
-            next_mm = finer;
+    // The first that costs more is the largest voxel that is finer.
+    for (const CasePoint& point : points) {
+        if (!(point.more_seconds > 0) || !(point.error_mm < (1 - kSame) * now_mm)) continue;
+        step.step = point.setting;
+        step.error_to_mm = point.error_mm;
+        step.more_seconds = point.more_seconds;
+        return step;
     }
-    if (!(next_mm > 0)) return {};
-    const auto voxels_of = [&](double h) { return volume_mm3 / (h * h * h); };
-    step.step = "resample.voxel_mm=" + number_text(next_mm, 3);
-    step.error_to_mm = changed(stage_names::kResample, "voxel_mm", next_mm);
-    step.more_seconds =
-        fit_cost_model(table).per_voxel_s * (voxels_of(next_mm) - voxels_of(voxel_mm));
-    return step;
+    return {};
 }
 
 }  // namespace sonocase::pipeline::inline tradeoff

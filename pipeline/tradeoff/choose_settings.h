@@ -76,6 +76,12 @@ Choice choose_settings(const FrontTable& table,
                        const AccuracyTarget& target,
                        const CaseFigures& figures);
 
+// The case's error with every voxel that the table has and with two landmarks, where its fit says
+// what they would bring; by seconds, the case as it is among them.
+std::vector<CasePoint> case_points(const FrontTable& table,
+                                   std::span<const StageReport> stages,
+                                   double volume_mm3);
+
 // What would lower the error of a case by a hundredth or more, by its own reports: two landmarks,
 // where its fit has none and says what they would bring; otherwise the largest voxel of the table
 // that does. volume_mm3  of its grid

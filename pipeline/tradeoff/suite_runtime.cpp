@@ -164,6 +164,88 @@ std::function<Result<Measured>(const Settings&)> against_the_finest(
 
 }  // namespace
 
+namespace {
+
+// What the player says of its effects: name, and what --measure-effects measured.
+struct MeasuredEffects {
+    struct Effect {
+        std::string name, why;
+        bool measured = false;
+        double ms = 0, noise_ms = 0, changed_part = 0, rms_grey = 0;
+    };
+    double frame_ms = 0;
+    std::vector<Effect> effects;
+};
+
+Result<MeasuredEffects> measure_effects() {
+    Player started;
+    SONOCASE_TRY_DONE(start(started));
+    const Player& player = started;
+    const std::string stats = player.folder.path() + "/stats.json";
+    const std::string command = quoted(player.program) + " " + quoted(player.bundle) +
+                                " --headless --tracker sweep:tour --measure-effects --frames " +
+                                std::to_string(kFrames) + " --stats " + quoted(stats) +
+                                " >/dev/null 2>&1";
+    if (std::system(command.c_str()) != 0)
+        return Error{"the player failed", command, "run it to see why"};
+    SONOCASE_TRY(const auto text, read_text_file(stats));
+    const auto json = nlohmann::json::parse(text, nullptr, false);
+    if (json.is_discarded() || !json.contains("effects_measured"))
+        return Error{"has no measured effects", stats, "use the player of this version"};
+    MeasuredEffects all;
+    all.frame_ms = json["effects_measured"].value("frame_ms", 0.0);
+    for (const auto& effect : json["effects"])
+        all.effects.push_back({effect.value("name", ""), effect.value("why", ""),
+                               effect.value("cost", "") == "measured", effect.value("ms", 0.0),
+                               effect.value("noise_ms", 0.0), effect.value("changed_part", 0.0),
+                               effect.value("rms_grey", 0.0)});
+    return all;
+}
+
+}  // namespace
+
+Suite effects_suite() {
+    auto measured = std::make_shared<Result<MeasuredEffects>>(measure_effects());
+    Suite suite;
+    suite.name = "effects";
+    suite.title = "Effects of a frame, each left out";
+    suite.body = "demo-torso";
+    suite.error_name = "rms change of all scanned pixels";
+    suite.error_unit = "grey";
+    suite.truth =
+        "Twelve frames of a sweep over the demo torso are drawn with and without each effect that "
+        "they call for, by one renderer in turn; seconds are processor time of a frame without it, "
+        "the fastest of eight turns. docs/effects.md has the instructions for the scenes of all "
+        "scenarios.";
+    Knob knob{"effects.left_out",
+              {"none"},
+              "none",
+              "",
+              "the effect that is left out",
+              "what that effect shows",
+              "an effect that changes little may cost much, and one that ends beams saves time"};
+    if (*measured)
+        for (const MeasuredEffects::Effect& effect : (*measured)->effects)
+            if (effect.measured) knob.values.push_back(effect.name);
+    suite.knobs = {std::move(knob)};
+    suite.measure = [measured](const Settings& settings) -> Result<Measured> {
+        if (!*measured) return measured->error();
+        const MeasuredEffects& all = **measured;
+        if (settings.empty() || settings[0].value == "none")
+            return Measured{0, 1e-3 * all.frame_ms, ""};
+        for (const MeasuredEffects::Effect& effect : all.effects) {
+            if (effect.name != settings[0].value) continue;
+            char note[200];
+            std::snprintf(note, sizeof note, "%.1f %% of the pixels; +- %.1f %% of a frame; %s",
+                          100 * effect.changed_part, 100 * effect.noise_ms / all.frame_ms,
+                          effect.why.c_str());
+            return Measured{effect.rms_grey, 1e-3 * (all.frame_ms - effect.ms), note};
+        }
+        return Error{"no effect is called " + settings[0].value, "effects.left_out", ""};
+    };
+    return suite;
+}
+
 Suite linear_suite() {
     auto player = std::make_shared<Player>();
     player->linear = true;

@@ -30,7 +30,9 @@ Suite calibrate_suite();
 Suite look_suite();
 // Frames of the player that lies beside this program, against its finest sampling.
 Suite render_suite();
-// The same with a linear probe, whose pictures have plates and grounds of their own.
+// Frames of that player with and without each effect: what it changes and costs.
+Suite effects_suite();
+// The same frames with a linear probe, whose pictures have plates and grounds of their own.
 Suite linear_suite();
 // The press field against the finite element blocks in data/deformation, by the program press_block
 // beside this one.

@@ -22,6 +22,11 @@ struct PageInput {
 // presets, the paper's settings and peers marked) and index.html into `folder`, which exists.
 Status write_tradeoff_page(const PageInput& input, const std::string& folder);
 
+// One picture of all suites that the paper has figures in or that presets are of: the paper's
+// settings, standard and presets, and the front, error against seconds. Error: no such suite, or
+// the file cannot be written.
+Status write_overview_picture(const PageInput& input, const std::string& path);
+
 // The text of docs/accuracy.md: the table of knobs, from the suites, and the figures of the trials.
 std::string format_accuracy_markdown(const PageInput& input);
 

@@ -11,6 +11,7 @@
 #include "pipeline/check/aim.h"
 #include "pipeline/check/check_case.h"
 #include "pipeline/check/scripted_expert.h"
+#include "pipeline/tradeoff/choose_settings.h"
 #include "pipeline/verbs/verb_common.h"
 #include "pipeline/verbs/verbs.h"
 
@@ -30,9 +31,13 @@ int verb_check(int argc, char** argv) {
     auto bundle = load_bundle(path);
     if (!bundle) return fail("check", bundle.error());
     const CheckResult result = check_case(*bundle);
-    if (!page.empty())
-        if (auto status = write_file(page, check_page(*bundle, result)); !status)
+    if (!page.empty()) {
+        const Vector3 extent = bundle->grid.bounds().extent();
+        const auto points =
+            case_points(measured_front(), bundle->manifest.stages, extent.x * extent.y * extent.z);
+        if (auto status = write_file(page, check_page(*bundle, result, points)); !status)
             return fail("check", status.error());
+    }
     const std::string as_json = check_json(*bundle, result) + "\n";
     if (!common.report_path.empty())
         if (auto status = write_file(common.report_path, as_json); !status)

@@ -9,6 +9,7 @@
 #include "formats/files/atomic_file.h"
 #include "formats/files/load_save.h"
 #include "formats/files/thread_jobs.h"
+#include "pipeline/export/accuracy_picture.h"
 #include "pipeline/export/inspect_case.h"
 #include "pipeline/tradeoff/choose_settings.h"
 #include "pipeline/verbs/verb_common.h"
@@ -20,10 +21,17 @@ int verb_inspect(int argc, char** argv) {
     CLI::App app(
         "Show what a bundle holds: grid, labels, tissues, errors and seconds of each stage");
     std::string path;
-    bool json = false;
+    bool json = false, accuracy = false;
+    std::string picture;
     CommonOptions common;
     app.add_option("BUNDLE", path, "The bundle")->required();
-    app.add_flag("--json", json, "As JSON, in the documented form");
+    auto* as_json = app.add_flag("--json", json, "As JSON, in the documented form");
+    app.add_flag("--accuracy", accuracy,
+                 "Only this case's accuracy: where its millimetres come from, which structures are "
+                 "known least, what more seconds would buy")
+        ->excludes(as_json);
+    app.add_option("--picture", picture, "Draw that accuracy into FILE.svg or FILE.png")
+        ->type_name("FILE");
     add_common_options(app, common);
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
     auto bytes = read_file(path);
@@ -34,10 +42,16 @@ int verb_inspect(int argc, char** argv) {
     Inspection inspection{path, digest_of(*bytes), bytes->size(), {}, {}};
     inspection.seconds = recorded_seconds(*bundle, path, inspection.digest);
     const Vector3 extent = bundle->grid.bounds().extent();
-    inspection.next =
-        next_step(measured_front(), bundle->manifest.stages, extent.x * extent.y * extent.z);
-    const std::string text =
-        json ? inspection_json(*bundle, inspection) : inspection_text(*bundle, inspection);
+    const double volume_mm3 = extent.x * extent.y * extent.z;
+    inspection.next = next_step(measured_front(), bundle->manifest.stages, volume_mm3);
+    const CaseAccuracy own =
+        case_accuracy(*bundle, case_points(measured_front(), bundle->manifest.stages, volume_mm3));
+    if (!picture.empty())
+        if (auto status = write_accuracy_picture(own, picture); !status)
+            return fail("inspect", status.error());
+    const std::string text = accuracy ? accuracy_text(own)
+                             : json   ? inspection_json(*bundle, inspection)
+                                      : inspection_text(*bundle, inspection);
     std::fputs(text.c_str(), stdout);
     if (!common.report_path.empty())
         if (auto status = write_file(common.report_path, inspection_json(*bundle, inspection));

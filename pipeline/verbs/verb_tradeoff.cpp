@@ -2,6 +2,7 @@
 
 // sonocase tradeoff: measures what accuracy costs in time.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -23,7 +24,7 @@ namespace sonocase::pipeline::inline verbs {
 namespace {
 
 struct TradeoffOptions {
-    std::string suite;  // empty: all, or none if there is a recipe
+    std::vector<std::string> suites;  // empty: all, or none if there is a recipe
     bool quick = false;
     bool fresh = false;
     int repeats = 0;
@@ -32,6 +33,7 @@ struct TradeoffOptions {
     std::string data;
     std::string markdown;
     std::string front;
+    std::string picture;
     CommonOptions common;
 };
 
@@ -69,6 +71,7 @@ std::vector<NamedSuite> suites() {
         {"calibrate", calibrate_suite},
         {"look", look_suite},
         {"render", render_suite},
+        {"effects", effects_suite},
         {"linear", linear_suite},
         {"region", region_suite},
         {"pathology", pathology_suite},
@@ -81,16 +84,19 @@ std::vector<NamedSuite> suites() {
 int tradeoff(const TradeoffOptions& options) {
     const ThreadLimit limit(options.common.threads);
     std::vector<std::function<Suite()>> makers;
+    const auto asked = [&](const char* name) {
+        return std::find(options.suites.begin(), options.suites.end(), name) !=
+               options.suites.end();
+    };
     for (const NamedSuite& named : suites()) {
-        const bool wanted = options.suite == named.name || options.suite == "all" ||
-                            (options.suite.empty() && options.recipe.empty());
+        const bool wanted =
+            asked(named.name) || asked("all") || (options.suites.empty() && options.recipe.empty());
         if (wanted) makers.push_back(named.make);
     }
     // These need data or programs that packages lack, and run only where they are named.
-    if (options.suite == "colour") makers.push_back(colour_suite);
-    if (options.suite == "spectrum") makers.push_back(spectrum_suite);
-    if (options.suite == "press")
-        makers.push_back([data = options.data] { return press_suite(data); });
+    if (asked("colour")) makers.push_back(colour_suite);
+    if (asked("spectrum")) makers.push_back(spectrum_suite);
+    if (asked("press")) makers.push_back([data = options.data] { return press_suite(data); });
     if (!options.recipe.empty()) {
         RecipeOverrides overrides;
         overrides.data = options.data;
@@ -152,6 +158,9 @@ int tradeoff(const TradeoffOptions& options) {
     }
     if (const Status s = write_tradeoff_page(page, options.out); !s)
         return fail("tradeoff", s.error());
+    if (!options.picture.empty())
+        if (const Status s = write_overview_picture(page, options.picture); !s)
+            return fail("tradeoff", s.error());
     if (!options.markdown.empty()) {
         const Status s = write_file(options.markdown, format_accuracy_markdown(page));
         if (!s) return fail("tradeoff", s.error());
@@ -180,8 +189,9 @@ int verb_tradeoff(int argc, char** argv) {
     for (const NamedSuite& named : suites())
         if (names.back() != named.name) names.emplace_back(named.name);
     for (const char* name : {"press", "colour", "spectrum"}) names.emplace_back(name);
-    app.add_option("--suite", options.suite,
-                   "Which stage; all but the last three unless --case is given")
+    app.add_option("--suite", options.suites,
+                   "Which stage; may be repeated. All but the last three unless --case is given")
+        ->allow_extra_args(false)
         ->check(CLI::IsMember(names));
     app.add_flag("--quick", options.quick,
                  "Fewer values, no pairs, one run each: minutes, not an hour");
@@ -201,6 +211,10 @@ int verb_tradeoff(int argc, char** argv) {
     app.add_option("--markdown", options.markdown,
                    "Also write the tables as Markdown (docs/accuracy.md)")
         ->type_name("FILE");
+    app.add_option("--picture", options.picture,
+                   "Also draw what is at the head of docs/accuracy.md: error against seconds of "
+                   "the paper, the presets and the front")
+        ->type_name("FILE.png");
     app.add_option("--front", options.front,
                    "Also write the table that --tolerance-mm chooses from")
         ->type_name("FILE");

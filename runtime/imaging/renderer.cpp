@@ -152,6 +152,7 @@ struct Renderer::Impl {
     EffectChoice effects;
     int deformation = -1;                      // row of the effect in the table
     std::unique_ptr<press::ProbePress> probe;  // null: the effect is off
+    bool presses = true;                       // false: it is left out for now
     PressReport press;                         // from the last frame
     Rigid shown_pose;
     std::vector<Level> levels;  // finest first; one without a frame budget
@@ -181,7 +182,7 @@ Result<Renderer> Renderer::create(CaseView bundle,
     Impl& m = *impl;
     m.effects = std::move(effects);
     if (!(m.needle.slab_mm > 0)) m.needle.slab_mm = info.needle_slab_mm(exercise);
-    for (const char* name : info.effects) m.costs.push_back({name, 0, false, ""});
+    for (const char* name : info.effects) m.costs.push_back({name, 0, false, "", false});
     m.deformation = row_of_effect(info, "deformation");
     if (m.deformation >= 0 && m.effects.on[m.deformation])
         m.probe = std::make_unique<press::ProbePress>(bundle, exercise, simd);
@@ -226,7 +227,7 @@ FrameStatus Renderer::render(const FrameInput& input, std::span<std::uint8_t> pi
     NeedleShape needle;
     const bool shown = needle_shown(held, m.needle, needle);
     const press::PressField* pressed = nullptr;
-    if (m.probe) {
+    if (m.probe && m.presses) {
         const NeedlePose& in = input.needle;
         m.probe->dent(shown ? bounded_dent(needle.tip, needle.axis, in.tent_mm, in.drag_mm)
                             : NeedleDent{});
@@ -249,7 +250,7 @@ void Renderer::press_probe(const FrameInput& input) {
     Impl& m = *impl_;
     if (!valid_pose(input.mannequin_from_probe)) return;
     m.shown_pose = input.mannequin_from_probe;
-    if (!m.probe) return;
+    if (!m.probe || !m.presses) return;
     m.probe->set_venous_pressure(input.change.venous_pressure_mmhg);
     m.shown_pose = m.probe->at(input.mannequin_from_probe, input.settings.press_mm);
     m.press = m.probe->report();
@@ -278,6 +279,11 @@ Point3 Renderer::current_position(Point3 rest) const {
 
 bool Renderer::closed(Point3 rest) const {
     return impl_->probe && impl_->probe->closed(rest);
+}
+
+void Renderer::leave_out(int effect) {
+    impl_->presses = effect != impl_->deformation;
+    impl_->formation->leave_out(effect);
 }
 
 std::span<const EffectCost> Renderer::costs() const {

@@ -44,6 +44,10 @@ class Renderer {
     // drawn. render() does not solve again. A pose that is not rigid changes nothing.
     void press_probe(const FrameInput& input);
 
+    // From the next frame on, the effect of this row of effect_names() is left out although it is
+    // on; -1: none is. So a picture with and one without it come from the same memory.
+    void leave_out(int effect);
+
     // Costs of the last frame: one per effect of the model, in order of execution.
     std::span<const EffectCost> costs() const;
 

@@ -184,6 +184,10 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
         ->group("Headless");
     app.add_option("--stats", arguments.stats,
                    "Write times and costs as JSON; - for standard output");
+    app.add_flag("--measure-effects", arguments.measure_effects,
+                 "With --stats: measure what each effect costs and changes, by drawing frames of "
+                 "the run again with and without it; some seconds")
+        ->group("Headless");
     app.add_option("--record", arguments.record, "Record the session to FILE.igs.mha");
     app.add_option("--trainee", arguments.trainee,
                    "With --record: a chosen name, under which the scores are kept on this machine");

@@ -3,10 +3,15 @@
 // Draws fixed frames for scripts/count-instructions, which runs this program under valgrind's
 // callgrind: a count of instructions is the same on a busy machine as on an idle one.
 //   sonocase_count BUNDLE
+//   sonocase_count --effects BUNDLE
+// draws frames of every exercise with and without each effect, and prints how they differ: lines
+// "EXERCISE EFFECT CHANGED RMS", the changed share of the scanned pixels and the change in grey.
 // Counts from one request to the next are handed over under the name of what was counted. Without
 // valgrind the requests do nothing.
 #include <valgrind/callgrind.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -17,6 +22,7 @@
 #include "formats/files/load_save.h"
 #include "formats/machine/machine.h"
 #include "runtime/engine/skin.h"
+#include "runtime/imaging/core/scan_geometry.h"
 #include "runtime/imaging/doppler/doppler_view.h"
 #include "runtime/imaging/renderer.h"
 #include "runtime/player/headless/run_headless.h"
@@ -199,14 +205,105 @@ void count_all(const std::string& path) {
     f.headless("headless/21_frames", 21);
 }
 
+// Three frames of the first two sweeps of an exercise as its author meant them: its needle, its
+// motion and its pressing.
+std::vector<FrameInput> frames_of(const Exercise& exercise, const Skin& skin) {
+    std::vector<FrameInput> frames;
+    for (std::size_t s = 0; s < std::min<std::size_t>(exercise.sweeps.size(), 2); ++s) {
+        const Sweep& sweep = exercise.sweeps[s];
+        if (sweep.keys.empty()) continue;
+        const double from = sweep.keys.front().time_s, to = sweep.keys.back().time_s;
+        for (const double part : {0.2, 0.5, 0.8}) {
+            FrameInput input;
+            input.frame = static_cast<std::uint32_t>(frames.size());
+            input.time_s = from + part * (to - from);
+            const SweepPose pose = sweep_pose(sweep, input.time_s, &skin);
+            input.mannequin_from_probe = pose.mannequin_from_probe;
+            input.settings.press_mm = exercise.deformation.press_offset_mm;
+            input.has_needle = pose.has_needle;
+            if (pose.has_needle) {
+                input.needle.tip = Point3{} + pose.mannequin_from_needle.translation;
+                input.needle.direction = pose.mannequin_from_needle.rotation.column(2);
+            }
+            frames.push_back(input);
+        }
+    }
+    return frames;
+}
+
+double scanned_pixels(const Probe& probe) {
+    const ScanGeometry geometry = make_scan_geometry(probe, 2, 2, kSize, kSize);
+    double count = 0, line = 0, sample = 0;
+    for (int row = 0; row < kSize; ++row)
+        for (int column = 0; column < kSize; ++column)
+            count += geometry.locate(geometry.pixel_centre(column, row), line, sample) ? 1 : 0;
+    return count;
+}
+
+void count_effects(const std::string& path) {
+    const auto bundle = load_bundle(path);
+    must(static_cast<bool>(bundle), path + " cannot be read");
+    const Skin skin(*bundle);
+    const auto textures = make_physical_textures();
+    for (const EmbeddedExercise& embedded : bundle->exercises) {
+        const auto exercise = parse_exercise(embedded.toml, embedded.name);
+        must(static_cast<bool>(exercise), "exercise");
+        const std::vector<FrameInput> frames = frames_of(*exercise, skin);
+        if (frames.empty()) continue;
+        RenderOptions options;
+        options.width_px = options.height_px = kSize;
+        options.textures = textures;
+        auto renderer = Renderer::create(*bundle, *exercise, options);
+        must(static_cast<bool>(renderer), "no renderer");
+        using Pictures = std::vector<std::vector<std::uint8_t>>;
+        const Pictures blank(frames.size(), std::vector<std::uint8_t>(kSize * kSize));
+        Pictures with = blank, without = blank;
+        const auto draw = [&](Pictures& pictures) {
+            for (std::size_t i = 0; i < frames.size(); ++i)
+                renderer->render(frames[i], pictures[i]);
+        };
+        std::vector<bool> ran(renderer->costs().size(), false);
+        for (std::size_t i = 0; i < frames.size(); ++i) {
+            renderer->render(frames[i], with[i]);
+            for (std::size_t e = 0; e < ran.size(); ++e)
+                ran[e] =
+                    ran[e] || (renderer->costs()[e].ran && renderer->costs()[e].can_be_left_out);
+        }
+        counted(embedded.name + "/all", frames.size(), [&] { draw(with); });
+        const double scanned = scanned_pixels(exercise->probe) * static_cast<double>(frames.size());
+        for (std::size_t e = 0; e < ran.size(); ++e) {
+            if (!ran[e]) continue;
+            const char* name = renderer->costs()[e].name;
+            renderer->leave_out(static_cast<int>(e));
+            counted(embedded.name + "/" + name, frames.size(), [&] { draw(without); });
+            double changed = 0, squares = 0;
+            for (std::size_t i = 0; i < frames.size(); ++i) {
+                for (std::size_t p = 0; p < with[i].size(); ++p) {
+                    const int difference = with[i][p] - without[i][p];
+                    changed += difference != 0 ? 1 : 0;
+                    squares += difference * difference;
+                }
+            }
+            std::printf("%s %s %.6f %.4f\n", embedded.name.c_str(), name, changed / scanned,
+                        std::sqrt(squares / scanned));
+            std::fflush(stdout);
+        }
+    }
+}
+
 }  // namespace
 }  // namespace sonocase::bench
 
 int main(int argc, char** argv) {
-    if (argc != 2) {
-        std::fprintf(stderr, "usage: sonocase_count BUNDLE\n");
+    const bool effects = argc == 3 && std::string(argv[1]) == "--effects";
+    if (argc != 2 && !effects) {
+        std::fprintf(stderr, "usage: sonocase_count [--effects] BUNDLE\n");
         return 2;
     }
-    sonocase::bench::count_all(argv[1]);
+    if (effects) {
+        sonocase::bench::count_effects(argv[2]);
+    } else {
+        sonocase::bench::count_all(argv[1]);
+    }
     return 0;
 }

@@ -12,6 +12,7 @@
 
 #include "formats/bundle/case_bundle.h"
 #include "formats/files/load_save.h"
+#include "formats/machine/machine.h"
 #include "runtime/imaging/renderer.h"
 #include "runtime/player/session/png_file.h"
 
@@ -35,6 +36,7 @@ const View kViews[] = {
     {"kidney", "kidney_right", {0, -0.9, 0.35}, {1, 0, 0}, false, 150},
     {"aorta", "aorta", {0, 0.05, 1}, {0, 1, 0}, false, 150, {-20, 0, 0}},
     {"gas", "colon", {0, 0.3, 1}, {0, 1, 0}, false, 150, {20, 0, 0}},
+    {"dome", "liver", {0, -0.5, 1}, {0, 1, 0}, false, 150, {30, 0, 0}},
     {"bladder", "urinary_bladder", {0.25, 0, 1}, {1, 0, 0}, false, 180},
     {"gallbladder", "gallbladder", {-0.4, -0.3, 1}, {0, 1, 0}, false, 130},
     {"rib", "rib_right_9", {0, -1, 0.2}, {1, 0, 0.1}, true, 50},
@@ -112,6 +114,7 @@ struct Shot {
     const char* view = "liver";
     bool needle = false, target = false;
     double lift_mm = 0, breathing_mm = 0, pulse_mm = 0, press_mm = 0;
+    const char* machine = "";  // "": the probe's own; "sharpened": that with an unsharp mask
 };
 
 Picture draw(const Body& body,
@@ -119,7 +122,8 @@ Picture draw(const Body& body,
              ImageModel model,
              const std::vector<std::string>& effects,
              int width,
-             int height) {
+             int height,
+             int looks = 0) {
     const View* view = kViews;
     for (const View& v : kViews)
         if (std::string(v.name) == shot.view) view = &v;
@@ -134,6 +138,8 @@ Picture draw(const Body& body,
         e.probe.elevation_mm = 2;
     }
     const Rigid pose = body.pose(*view, shot.lift_mm);
+    e.start_probe = Point3{} + pose.translation;  // what the opening gain is worked out from
+    e.start_beam = pose.rotation.column(2);
     runtime::FrameInput input;
     input.mannequin_from_probe = pose;
     input.frame = 3;
@@ -160,6 +166,13 @@ Picture draw(const Body& body,
     runtime::RenderOptions o;
     o.model = model;
     o.effects = effects;
+    o.looks = looks;
+    if (shot.machine == std::string("sharpened")) {
+        o.machine = Machine{};
+        o.machine->edge_enhancement = 1;
+    } else if (shot.machine[0] != 0) {
+        o.machine = *built_in_machine(shot.machine);
+    }
     o.width_px = width;
     o.height_px = height;
     Picture p(width, height);
@@ -167,11 +180,25 @@ Picture draw(const Body& body,
     return p;
 }
 
+// Effects that only some machines have.
+Shot classic(const char* view) {
+    Shot shot;
+    shot.view = view;
+    shot.machine = "classic";
+    return shot;
+}
+Shot sharpened(const char* view) {
+    Shot shot;
+    shot.view = view;
+    shot.machine = "sharpened";
+    return shot;
+}
+
 // Where each effect shows best.
 Shot shot_of(const std::string& effect) {
     static const std::map<std::string, Shot> shots{{"contact", {"liver", false, false, 5}},
                                                    {"breathing", {"kidney", false, false, 0, 15}},
-                                                   {"pulsation", {"aorta", false, false, 0, 0, 3}},
+                                                   {"pulsation", {"vessel", false, false, 0, 0, 1}},
                                                    {"boundaries", {"rib"}},
                                                    {"structure", {"kidney"}},
                                                    {"fine_structure", {"muscle"}},
@@ -183,9 +210,13 @@ Shot shot_of(const std::string& effect) {
                                                    {"gas_ring_down", {"gas"}},
                                                    {"needle", {"liver", true}},
                                                    {"near_field", {"fat"}},
-                                                   {"noise", {"bladder"}},
-                                                   {"persistence", {"bladder"}},
-                                                   {"haze", {"bladder"}},
+                                                   {"diaphragm", {"dome"}},
+                                                   {"noise", classic("bladder")},
+                                                   {"persistence", classic("bladder")},
+                                                   {"haze", classic("bladder")},
+                                                   {"post_filter", classic("kidney")},
+                                                   {"grey_map", classic("kidney")},
+                                                   {"edge_enhancement", sharpened("kidney")},
                                                    {"equalisation", {"kidney"}},
                                                    {"shadow", {"kidney"}},
                                                    {"texture", {"kidney"}}};
@@ -211,7 +242,9 @@ bool effect_pictures(const Body& body, const std::string& folder) {
             const Shot shot = shot_of(name);
             Picture both(2 * kWidth + kGap, kHeight, 90);
             both.put(draw(body, shot, model, {"auto"}, kWidth, kHeight), 0, 0);
-            both.put(draw(body, shot, model, {std::string("-") + name}, kWidth, kHeight),
+            const bool looks = name == std::string("looks");  // has a number and no switch
+            const auto without = looks ? std::string("auto") : std::string("-") + name;
+            both.put(draw(body, shot, model, {without}, kWidth, kHeight, looks ? 1 : 0),
                      kWidth + kGap, 0);
             const char* prefix = model == ImageModel::paper ? "/paper-" : "/physical-";
             if (!save(folder + prefix + name + ".png", both)) return false;

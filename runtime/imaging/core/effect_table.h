@@ -32,8 +32,9 @@ Result<EffectChoice> choose_effects(std::span<const std::string> requested,
                                     std::span<const char* const> others);
 
 // The timed parts of a frame. Effects of one pass are fused into one loop, and the pass's time is
-// shared among those that ran by their measured weights (sonocase_bench, Effect/*), since a clock
-// inside the loop would cost more than they do.
+// shared among those that ran by fixed weights, since a clock inside the loop would cost more than
+// they do: an estimate. What an effect costs is measured by leaving it out (`sonoplay
+// --measure-effects`).
 enum class Pass { contact, beams, needle, filter, grey, convert };
 inline constexpr std::size_t kPassCount = 6;
 using PassTimes = std::array<double, kPassCount>;  // ms
@@ -49,6 +50,7 @@ struct EffectEntry {
     bool Switches::*on = nullptr;  // null: always on
     // Returns "" where the effect ran; null: it always does.
     const char* (*skipped_because)(const Scene& scene) = nullptr;
+    const char* called_for_by = "part of every picture";  // why it ran
 };
 
 // Fills in the cost of each effect: why it did not run, or its part of its pass's time. scene: null
@@ -68,7 +70,8 @@ void fill_costs(std::type_identity_t<std::span<const EffectEntry<Switches, Scene
         } else if (scene != nullptr && effect.skipped_because != nullptr) {
             why = effect.skipped_because(*scene);
         }
-        costs[i] = {effect.name, 0, *why == '\0', why};
+        const bool ran = *why == '\0';
+        costs[i] = {effect.name, 0, ran, ran ? effect.called_for_by : why, effect.on != nullptr};
         if (costs[i].ran) weight[static_cast<std::size_t>(effect.pass)] += effect.weight;
     }
     for (std::size_t i = 0; i < table.size(); ++i) {
@@ -91,6 +94,14 @@ Switches switches_of(const std::array<Entry, N>& table, const std::vector<bool>&
     for (std::size_t i = 0; i < N; ++i) {
         if (table[i].on != nullptr) switches.*table[i].on = on[i];
     }
+    return switches;
+}
+
+// The same without the effect of one row; -1: with all.
+template <class Switches, class Entry, std::size_t N>
+Switches switches_without(const std::array<Entry, N>& table, Switches switches, int row) {
+    if (row >= 0 && table[static_cast<std::size_t>(row)].on != nullptr)
+        switches.*table[static_cast<std::size_t>(row)].on = false;
     return switches;
 }
 

@@ -110,9 +110,10 @@ struct PressReport {
 // What one effect cost in the last frame.
 struct EffectCost {
     const char* name = "";
-    double ms = 0;
+    double ms = 0;  // its estimated share of its pass
     bool ran = false;
-    const char* skipped_because = "";  // "" where it ran
+    const char* why = "";          // what calls for it in this frame, or why it did not run
+    bool can_be_left_out = false;  // the model draws pictures without it
 };
 
 // What a Doppler mode showed in a frame, beside what was true there: for recordings and scores.

@@ -70,6 +70,8 @@ class ImageFormation {
                                     const FrameRequest& request,
                                     std::span<std::uint8_t> pixels,
                                     std::span<EffectCost> costs) = 0;
+    // Row of the effect that frames leave out from now on, although it is on; -1: none.
+    virtual void leave_out(int effect) = 0;
     // Renders the same picture by the slow, obvious renderer at level 0; never flipped.
     virtual void render_reference(const FrameRequest& request,
                                   std::span<std::uint8_t> pixels,

@@ -21,7 +21,8 @@ class PaperFormation final : public ImageFormation {
           seed_(input.options.seed),
           reference_(input.options.kind == RendererKind::reference),
           keep_all_(input.effects.keep_all),
-          switches_(switches_of<PaperEffects>(kPaperEffects, input.effects.on)),
+          chosen_(switches_of<PaperEffects>(kPaperEffects, input.effects.on)),
+          switches_(chosen_),
           context_(input.context) {}
 
     void add_level(const ScanGeometry& geometry, double) override {
@@ -44,6 +45,10 @@ class PaperFormation final : public ImageFormation {
                         keep_all_, pixels);
         fill_costs(kPaperEffects, switches_, &at.fast->met(), at.fast->pass_ms(), costs);
         return FrameStatus::rendered;
+    }
+
+    void leave_out(int effect) override {
+        switches_ = switches_without(kPaperEffects, chosen_, effect);
     }
 
     void render_reference(const FrameRequest& request,
@@ -85,7 +90,8 @@ class PaperFormation final : public ImageFormation {
     const std::vector<std::int8_t> noise_;
     const std::uint32_t seed_;
     const bool reference_, keep_all_;
-    const PaperEffects switches_;
+    const PaperEffects chosen_;
+    PaperEffects switches_;  // less what is left out
     const RenderContext context_;
     ScanGeometry geometry_;  // for the reference
     std::vector<Level> levels_;

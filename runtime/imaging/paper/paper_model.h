@@ -25,16 +25,18 @@ struct PaperMet {
 
 inline constexpr std::array<EffectEntry<PaperEffects, PaperMet>, 9> kPaperEffects{{
     {"deformation", Pass::beams, 1, 2, 9, &PaperEffects::deformation,
-     [](const PaperMet& m) { return m.pressed ? "" : "nothing is pressed"; }},
+     [](const PaperMet& m) { return m.pressed ? "" : "nothing is pressed"; }, "the probe presses"},
     {"slice", Pass::beams, 5, 2, 5},
     {"texture", Pass::beams, 3, 1, 1, &PaperEffects::texture},
     {"needle", Pass::needle, 1, 0, 2, &PaperEffects::needle,
      [](const PaperMet& m) {
          return !m.needle_given ? "no needle" : m.needle ? "" : "needle outside the slab";
-     }},
+     },
+     "the needle shows in the slab"},
     {"noise", Pass::beams, 1, 0, 1, &PaperEffects::noise},
     {"shadow", Pass::beams, 1, 0, 0, &PaperEffects::shadow,
-     [](const PaperMet& m) { return m.shadow ? "" : "no bone or gas crossed"; }},
+     [](const PaperMet& m) { return m.shadow ? "" : "no bone or gas crossed"; },
+     "bone or gas crossed"},
     {"attenuation", Pass::beams, 0.5, 0, 0, &PaperEffects::attenuation},
     {"blur", Pass::filter, 1, 0, 2, &PaperEffects::blur},
     {"scan_conversion", Pass::convert, 1, 1, 7},

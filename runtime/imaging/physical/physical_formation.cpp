@@ -45,7 +45,8 @@ class PhysicalFormation final : public ImageFormation {
           seed_(input.options.seed),
           reference_(input.options.kind == RendererKind::reference),
           keep_all_(input.effects.keep_all),
-          switches_(switches_of<PhysicalEffects>(kPhysicalEffects, input.effects.on)),
+          chosen_(switches_of<PhysicalEffects>(kPhysicalEffects, input.effects.on)),
+          switches_(chosen_),
           shown_(shown_by(switches_, machine_of(input).structures)),
           context_(input.context),
           machine_(machine_of(input)) {
@@ -95,6 +96,11 @@ class PhysicalFormation final : public ImageFormation {
         fill_costs(kPhysicalEffects, switches_, &at.fast->met(), at.fast->pass_ms(), costs);
         return at.fast->met().beams_in_contact == 0 ? FrameStatus::no_contact
                                                     : FrameStatus::rendered;
+    }
+
+    void leave_out(int effect) override {
+        switches_ = switches_without(kPhysicalEffects, chosen_, effect);
+        shown_ = shown_by(switches_, machine_.structures);
     }
 
     void render_reference(const FrameRequest& request,
@@ -151,7 +157,8 @@ class PhysicalFormation final : public ImageFormation {
     VoxelBlocks* const blocks_;
     const std::uint32_t seed_;
     const bool reference_, keep_all_;
-    const PhysicalEffects switches_, shown_;  // what is asked for; what the machine shows of it
+    const PhysicalEffects chosen_;
+    PhysicalEffects switches_, shown_;  // less what is left out; what the machine shows of them
     const RenderContext context_;
     const Machine machine_;
     std::vector<std::unique_ptr<Level>> levels_;

@@ -31,6 +31,7 @@
 #include "runtime/player/headless/truth_files.h"
 #include "runtime/player/session/calibration_set.h"
 #include "runtime/player/session/clock.h"
+#include "runtime/player/session/effect_trials.h"
 #include "runtime/player/session/frame_server.h"
 #include "runtime/player/session/frame_stats.h"
 #include "runtime/player/session/open_case.h"
@@ -301,6 +302,7 @@ class HeadlessRun {
     std::unique_ptr<IgtlServer> server_;   // --serve
     std::unique_ptr<PoseServer> poses_;    // --serve-poses
     std::optional<DopplerRun> doppler_;    // from the first frame of a Doppler mode on
+    std::vector<FrameInput> inputs_;       // of the run's frames; with --measure-effects
     FrameStats stats_;
     TimeHistogram pose_to_pixel_;
 };
@@ -490,6 +492,7 @@ Status HeadlessRun::render(int i, double now_s) {
     const double after_s = steady_seconds();
     if (Status read = bundle_health(*open_); !read) return read;
     stats_.add((after_s - before_s) * 1e3, engine_->renderer().costs());
+    if (arguments_.measure_effects) inputs_.push_back(engine_->last().input);
     stats_.count_unfitted(engine_->last().skin_not_fitted);
     stats_.set_press(engine_->renderer().press());
     if (device) {
@@ -568,6 +571,12 @@ Status HeadlessRun::finish() {
     }
     if (tracker_->is_device()) {
         if (Status seen = report_lost(); !seen) return seen;
+    }
+    if (arguments_.measure_effects) {
+        constexpr int kTurns = 8;
+        SONOCASE_TRY(auto trials, try_effects(open_->bundle, engine_->exercise(),
+                                              engine_->render_options(), inputs_, kTurns));
+        stats_.set_measured(std::move(trials));
     }
     if (!arguments_.stats.empty()) {
         const std::string doppler = doppler_ ? doppler_->json() : std::string();

@@ -24,6 +24,7 @@ struct PlayerArguments {
     std::string out;                  // folder for frames; empty: none are written
     std::string truth;                // folder for what the frames show; empty: none
     std::string stats;                // JSON file, "-" for standard output; empty: none
+    bool measure_effects = false;     // headless, with stats: what each costs, by leaving it out
     std::string record;               // recording to write; empty: none
     std::string trainee;  // a chosen name for the progress book; empty: no progress is kept
     std::string model;    // "paper", "physical"; empty: the exercise's

@@ -84,8 +84,8 @@ void FrameStats::add(double frame_ms, std::span<const EffectCost> costs) {
     if (effects_.size() != costs.size()) set_effects(costs);
     for (std::size_t i = 0; i < costs.size(); ++i) {
         effects_[i].total_ms += costs[i].ran ? costs[i].ms : 0;
-        effects_[i].skipped += costs[i].ran ? 0 : 1;
-        if (!costs[i].ran) effects_[i].last_reason = costs[i].skipped_because;
+        (costs[i].ran ? effects_[i].ran : effects_[i].skipped) += 1;
+        (costs[i].ran ? effects_[i].ran_because : effects_[i].skipped_because) = costs[i].why;
     }
 }
 
@@ -97,6 +97,18 @@ void FrameStats::set_press(const PressReport& press) {
 void FrameStats::set_accuracy(const Renderer::Accuracy& accuracy) {
     accuracy_ = accuracy;
     if (accuracy.level > 0) ++reduced_frames_;
+}
+
+std::string FrameStats::why(const Effect& effect) {
+    const std::uint64_t all = effect.ran + effect.skipped;
+    std::string text;
+    if (effect.ran > 0)
+        text = "on in " + std::to_string(effect.ran) + " of " + std::to_string(all) +
+               " frames: " + effect.ran_because;
+    if (effect.skipped > 0)
+        text += (text.empty() ? "skipped: " : "; in the others: ") +
+                std::string(effect.skipped_because);
+    return text;
 }
 
 std::string FrameStats::json(const std::string& score_json,
@@ -121,14 +133,28 @@ std::string FrameStats::json(const std::string& score_json,
     out["force_n"]["mean"] = rounded(force_sum_n_ / std::max<double>(1, double(frame_ms_.count())));
     out["force_n"]["max"] = rounded(force_max_n_);
     out["effects"] = nlohmann::ordered_json::array();
-    for (const Effect& effect : effects_) {
+    for (std::size_t i = 0; i < effects_.size(); ++i) {
+        const Effect& effect = effects_[i];
+        const bool measured = i < trials_.effects.size() && trials_.effects[i].tried;
         nlohmann::ordered_json entry;
         entry["name"] = effect.name;
-        entry["ms"] = rounded(effect.total_ms / std::max<double>(1, double(frame_ms_.count())));
+        entry["ms"] =
+            rounded(measured ? trials_.effects[i].ms
+                             : effect.total_ms / std::max<double>(1, double(frame_ms_.count())));
+        entry["cost"] = measured ? "measured" : "estimated";
+        if (measured) {
+            const EffectTrial& trial = trials_.effects[i];
+            entry["noise_ms"] = rounded(trial.noise_ms);
+            entry["changed_part"] = rounded(trial.changed_part);
+            entry["rms_grey"] = rounded(trial.rms_grey);
+        }
         entry["skipped_frames"] = effect.skipped;
-        if (effect.last_reason && *effect.last_reason)
-            entry["skipped_because"] = effect.last_reason;
+        entry["why"] = why(effect);
         out["effects"].push_back(entry);
+    }
+    if (trials_.frames > 0) {
+        out["effects_measured"]["frames"] = trials_.frames;
+        out["effects_measured"]["frame_ms"] = rounded(trials_.frame_ms);
     }
     if (pose_to_pixel_ms && pose_to_pixel_ms->count() > 0) {
         out["pose_to_pixel_ms"]["median"] = rounded(pose_to_pixel_ms->quantile(0.5));

@@ -11,6 +11,7 @@
 
 #include "formats/base/result.h"
 #include "runtime/imaging/renderer.h"
+#include "runtime/player/session/effect_trials.h"
 
 namespace sonocase::runtime::inline player_session {
 
@@ -60,11 +61,14 @@ class FrameStats {
     // How the frame just added was deformed by the probe.
     void set_press(const PressReport& press);
     void set_first_frame_ms(double ms) { first_frame_ms_ = ms; }
+    // What effects cost in frames of this run, measured by leaving them out.
+    void set_measured(EffectTrials trials) { trials_ = std::move(trials); }
     // Time of the truth planes and facts of a frame, without writing them.
     void add_truth(double ms) { truth_ms_.add(ms); }
 
     const TimeHistogram& frame_ms() const { return frame_ms_; }
-    // The JSON of --stats.
+    // The JSON of --stats. "cost" of an effect says where its "ms" come from: "measured" by
+    // set_measured(), or "estimated" as its share of its pass.
     // score_json   of a recorded session (formats/scoring/session_score.h); empty: none
     // window_json  of WindowStats; empty: none
     // The entries of the window follow those of the frames, those of the score come last.
@@ -76,15 +80,18 @@ class FrameStats {
     struct Effect {
         std::string name;
         double total_ms = 0;
-        std::uint64_t skipped = 0;
-        const char* last_reason = "";
+        std::uint64_t ran = 0, skipped = 0;
+        const char* ran_because = "";  // as in the last frame that it ran in
+        const char* skipped_because = "";
     };
+    static std::string why(const Effect& effect);
     TimeHistogram frame_ms_, truth_ms_;
     double first_frame_ms_ = 0;
     double force_sum_n_ = 0, force_max_n_ = 0;
     Renderer::Accuracy accuracy_;
     std::uint64_t reduced_frames_ = 0, unfitted_frames_ = 0;
     std::vector<Effect> effects_;
+    EffectTrials trials_;  // empty: not measured
 };
 
 }  // namespace sonocase::runtime::inline player_session

@@ -35,6 +35,7 @@ void draw_effects_panel(const ScanFrame& frame, float s) {
     const std::string lines = filled("%s, %d x %d", tr(accuracy.level == 0 ? "full" : "reduced"),
                                      accuracy.scanlines, accuracy.samples);
     row("Accuracy", lines.c_str(), accuracy.level == 0 ? colour::kText : colour::kWarn);
+    ImGui::TextDisabled("%s", tr("Why each is on, and its estimated share of the time, ms"));
     const float right = ImGui::GetWindowContentRegionMax().x;
     for (int i = 0; i < frame.cost_count; ++i) {
         const EffectCost& cost = frame.costs[i];
@@ -48,14 +49,14 @@ void draw_effects_panel(const ScanFrame& frame, float s) {
         }
         ImGui::PushStyleColor(ImGuiCol_Text, cost.ran ? colour::kText : colour::kFaint);
         ImGui::TextUnformatted(cost.name);
-        char value[64];
+        ImGui::SameLine(140 * s);
+        ImGui::TextUnformatted(cost.ran ? tr(cost.why)
+                                        : filled(tr("off: %s"), tr(cost.why)).c_str());
         if (cost.ran) {
-            std::snprintf(value, sizeof value, "%.2f", cost.ms);
-        } else {
-            std::snprintf(value, sizeof value, "%s", cost.skipped_because);
+            const std::string value = filled("%.2f", cost.ms);
+            ImGui::SameLine(right - ImGui::CalcTextSize(value.c_str()).x);
+            ImGui::TextUnformatted(value.c_str());
         }
-        ImGui::SameLine(std::max(right - ImGui::CalcTextSize(value).x, 90 * s));
-        ImGui::TextUnformatted(value);
         ImGui::PopStyleColor();
     }
     ImGui::PopFont();
@@ -466,7 +467,7 @@ void draw_notices(const Notices& notices, double now_s, Screen& screen, Ui& ui) 
 }
 
 void draw_effects(const ScanFrame& frame, Screen& screen, Ui& ui) {
-    const Box room = begin_page_dialog(ui, screen, "Effects", 460, 700);
+    const Box room = begin_page_dialog(ui, screen, "Effects", 520, 720);
     flow(ui, room, "effects", [&] { draw_effects_panel(frame, ui.scale()); });
     ui.end_layer();
 }

@@ -52,6 +52,26 @@ TEST(BuildTime, VoxelsOfARegionCostAsMuchAsOthersWithoutTheirSurfaces) {
     }
 }
 
+// Processor seconds of the stage pathology in the demo torso: 1, 4 and 16 lesions of
+// scenarios/lesion-gallery, of which three are free fluid.
+TEST(BuildTime, CountsLesionsAndFreeFluid) {
+    const struct {
+        double cooked, lesions, pools, stage_s;
+    } measured[] = {{11.7, 1, 0, 0.19},
+                    {39.6, 1, 0, 0.47},
+                    {39.6, 4, 0, 1.32},
+                    {11.7, 13, 3, 6.69},
+                    {39.6, 13, 3, 21.3}};
+    for (const auto& m : measured) {
+        CaseSize size{2.4, 2.4, m.cooked};
+        const double without = build_time(size, 64, 1, 2).processor_s;
+        size.lesions = m.lesions;
+        size.pools = m.pools;
+        const double more = build_time(size, 64, 1, 2).processor_s - without;
+        EXPECT_NEAR(more, m.stage_s, 0.1 * m.stage_s + 0.4) << m.cooked << " " << m.lesions;
+    }
+}
+
 TEST(BuildTime, FollowsSpeedThreadsAndTextures) {
     const CaseSize size{1, 1, 40};
     const BuildTime one = build_time(size, 64, 1, 1), slow = build_time(size, 64, 2, 1);

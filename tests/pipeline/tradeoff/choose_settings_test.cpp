@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/export/accuracy_picture.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/tradeoff/suites.h"
 
@@ -117,6 +118,51 @@ std::vector<StageReport> reports(double voxel_mm, double inside_mm, double with_
     resample.stage = "resample";
     resample.measures = {{"voxel_mm", voxel_mm}};
     return {warp, resample};
+}
+
+TEST(CasePoints, AreTheCasesOwnErrorAtEveryVoxelAndWithLandmarks) {
+    const auto points = case_points(table(), reports(2, 0.1, 0.05), 8e6);
+    int present = 0, landmarks = 0;
+    double last_s = -HUGE_VAL, last_mm = HUGE_VAL;
+    for (const CasePoint& point : points) {
+        EXPECT_GE(point.more_seconds, last_s);
+        last_s = point.more_seconds;
+        present += point.present;
+        landmarks += point.landmarks;
+        if (point.present) {
+            EXPECT_EQ(point.setting, "resample.voxel_mm=2");
+            EXPECT_EQ(point.more_seconds, 0);
+        }
+        if (point.landmarks) continue;
+        EXPECT_LT(point.error_mm, last_mm) << point.setting;
+        last_mm = point.error_mm;
+    }
+    EXPECT_EQ(present, 1);
+    EXPECT_EQ(landmarks, 1);
+    EXPECT_GE(points.size(), 3u);
+    // A case that was fitted and not cooked has one point: itself.
+    const std::vector<StageReport> fit{reports(2, 0.1, 0)[0]};
+    ASSERT_EQ(case_points(table(), fit, 8e6).size(), 1u);
+    EXPECT_TRUE(case_points(table(), fit, 8e6)[0].present);
+}
+
+TEST(CaseAccuracy, DrawsEveryPartOfTheBudgetAndSaysWhatIsNotKnown) {
+    CaseBundle bundle;
+    bundle.manifest.case_name = "mine";
+    bundle.manifest.stages = reports(2, 14, 5);
+    bundle.manifest.stages[0].groups = {{"unknown_p90_mm", {{"liver", 20}, {"aorta", 8}}},
+                                        {"unknown_p90_with_two_landmarks_mm", {{"liver", 6}}}};
+    const CaseAccuracy accuracy =
+        case_accuracy(bundle, case_points(table(), bundle.manifest.stages, 8e6));
+    const std::string said = accuracy_text(accuracy);
+    for (const char* part : {"mine", "skin beside the mannequin", " 14.00 mm  organs", "together",
+                             "tracker", "20.0 mm  (6.0 with two landmarks)", "as it is"})
+        EXPECT_NE(said.find(part), std::string::npos) << part << "\n" << said;
+    // The longest bar is the largest part's, and no line is wider than its words need.
+    EXPECT_NE(said.find("################################  14.00 mm"), std::string::npos) << said;
+    const std::string svg = accuracy_svg(accuracy);
+    EXPECT_EQ(svg.find("<svg"), svg.find("<"));
+    EXPECT_FALSE(write_accuracy_picture(accuracy, "accuracy.gif").has_value());
 }
 
 TEST(NextStep, IsTwoLandmarksWhereTheyHelpMost) {

@@ -140,6 +140,41 @@ TEST(CommandLine, ScoresARecordingOfAnotherTrainerAgainstItsTissueMesh) {
     EXPECT_NEAR(metrics["deepest_mm"].get<double>(), 5, 1e-9);
 }
 
+#ifndef __SANITIZE_ADDRESS__  // which takes memory of its own
+// The farm and --memory-mb trust what is said before a build. Bytes, unlike seconds, do not depend
+// on what else the machine does.
+TEST(CommandLine, ABuildTakesTheMemoryThatWasSaid) {
+    const TemporaryFolder folder;
+    folder.write("case.toml",
+                 "name = \"neck\"\nexercises = []\n[analytic]\nbody = \"neck\"\nneck_seed = 7\n"
+                 "voxel_mm = 0.75\nslice_mm = 1\nknown_map = true\n[resample]\nvoxel_mm = 1.5\n");
+    const CommandResult build =
+        sonocase_run("build case.toml -o neck.sonocase --report r.json --threads 2", folder);
+    ASSERT_EQ(build.status, 0) << build.error;
+    const auto report = nlohmann::json::parse(read_text(folder / "r.json"));
+    const double said = report["expected"]["memory_mb"], took = report["peak_mb"];
+    EXPECT_NEAR(said / took, 1, 0.2) << said << " MB said, " << took << " taken";
+}
+#endif
+
+// What inspect says and draws of the accuracy of a case.
+TEST(CommandLine, InspectDrawsTheAccuracyOfACase) {
+    const TemporaryFolder folder;
+    folder.write("case.toml", kTinyRecipe);
+    ASSERT_EQ(sonocase_run("build case.toml -o tiny.sonocase", folder).status, 0);
+    const CommandResult said =
+        sonocase_run("inspect tiny.sonocase --accuracy --picture a.svg", folder);
+    ASSERT_EQ(said.status, 0) << said.error;
+    EXPECT_NE(said.out.find("where its millimetres come from"), std::string::npos) << said.out;
+    EXPECT_NE(said.out.find("as it is"), std::string::npos) << said.out;
+    EXPECT_NE(read_text(folder / "a.svg").find("<svg"), std::string::npos);
+    EXPECT_EQ(sonocase_run("inspect tiny.sonocase --picture a.gif", folder).status, 1);
+    EXPECT_EQ(sonocase_run("inspect tiny.sonocase --accuracy --json", folder).status, 2);
+    // The page of check has the same picture.
+    sonocase_run("check tiny.sonocase -o page.html", folder);
+    EXPECT_NE(read_text(folder / "page.html").find("<h2>Accuracy</h2>"), std::string::npos);
+}
+
 TEST(CommandLine, BuildInspectValidateAndExportATinyCase) {
     const TemporaryFolder folder;
     folder.write("case.toml", kTinyRecipe);

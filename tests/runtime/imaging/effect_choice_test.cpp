@@ -83,14 +83,48 @@ TEST(EffectTables, CostsAddUpToTheFrameAndSkippedEffectsSayWhy) {
         double ms = 0;
         for (const EffectCost& cost : renderer->costs()) {
             ms += cost.ms;
-            EXPECT_EQ(cost.ran, *cost.skipped_because == '\0') << cost.name;
+            EXPECT_NE(*cost.why, '\0') << cost.name;
             EXPECT_TRUE(cost.ran || cost.ms == 0) << cost.name;
-            const std::string name = cost.name, why = cost.skipped_because;
+            const std::string name = cost.name, why = cost.why;
             EXPECT_EQ(why == "switched off", name == "noise") << name;
             EXPECT_EQ(why == "no needle", name == "needle") << name;
         }
         EXPECT_GT(ms, 0);
         EXPECT_EQ(renderer->costs().size(), effect_names(model).size());
+    }
+}
+
+// A renderer that leaves an effect out for a while draws what one without it draws, and then again
+// what it drew before.
+TEST(EffectTables, AnEffectIsLeftOutAsIfItHadNeverBeenOn) {
+    for (const ImageModel model : {ImageModel::paper, ImageModel::physical}) {
+        RenderOptions options;
+        options.model = model;
+        options.width_px = options.height_px = 64;
+        const auto create = [&](std::vector<std::string> effects) {
+            options.effects = std::move(effects);
+            auto renderer = Renderer::create(phantom(), phantom_exercise(), options);
+            EXPECT_TRUE(renderer.has_value());
+            return std::move(*renderer);
+        };
+        FrameInput input;
+        input.settings.press_mm = 3;
+        input.has_needle = true;
+        input.needle.tip = {5, 0, 30};
+        input.needle.direction = {0, 0, 1};
+        std::vector<std::uint8_t> all(64 * 64), left_out(64 * 64), without(64 * 64);
+        Renderer renderer = create({"auto"});
+        renderer.render(input, all);
+        const auto names = effect_names(model);
+        for (std::size_t i = 0; i < names.size(); ++i) {
+            renderer.leave_out(static_cast<int>(i));
+            renderer.render(input, left_out);
+            create({std::string("-") + names[i]}).render(input, without);
+            EXPECT_EQ(left_out, without) << names[i];
+        }
+        renderer.leave_out(-1);
+        renderer.render(input, left_out);
+        EXPECT_EQ(left_out, all);
     }
 }
 

@@ -170,7 +170,7 @@ TEST(MachineInTheRenderer, StructuresThatAMachineDoesNotShowAreLeftOut) {
     renderer->render({}, pixels);
     int none = 0;
     for (const EffectCost& cost : renderer->costs())
-        none += !cost.ran && std::string(cost.skipped_because) == "the machine shows none";
+        none += !cost.ran && std::string(cost.why) == "the machine shows none";
     EXPECT_EQ(none, 4);
 }
 

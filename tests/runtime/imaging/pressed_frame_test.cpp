@@ -131,8 +131,7 @@ TEST(PressedFrame, WhereNothingIsPressedTheEffectChangesNoPixelAndSaysSo) {
         const auto said = [&](double mm) {
             renderer->render(pressed_input(mm), pixels);
             for (const EffectCost& cost : renderer->costs())
-                if (std::string(cost.name) == "deformation")
-                    return std::string(cost.skipped_because);
+                if (std::string(cost.name) == "deformation") return std::string(cost.why);
             return std::string("no such effect");
         };
         EXPECT_EQ(said(-1), "nothing is pressed");

@@ -81,6 +81,38 @@ TEST_F(Headless, WritesFramesAndStatsOfASweep) {
     }
 }
 
+TEST_F(Headless, MeasuresWhatEffectsCostAndChange) {
+    const std::string command = bundle_ +
+                                " --headless --tracker sweep:along --model paper --frames 3 "
+                                "--effects=-shadow --size 128x96 --stats " +
+                                (folder_ / "stats.json");
+    const auto effects = [&](const std::string& more) {
+        const CommandResult run = play(command + more);
+        EXPECT_EQ(run.status, 0) << run.error;
+        return nlohmann::json::parse(read_text(folder_ / "stats.json"));
+    };
+    const auto named = [](const nlohmann::json& stats, const std::string& name) {
+        for (const auto& effect : stats["effects"])
+            if (effect["name"] == name) return effect;
+        return nlohmann::json();
+    };
+    const auto plain = effects(""), measured = effects(" --measure-effects");
+    EXPECT_EQ(named(plain, "noise")["cost"], "estimated");
+    EXPECT_FALSE(plain.contains("effects_measured"));
+    EXPECT_EQ(measured["effects_measured"]["frames"], 3);
+    EXPECT_GT(measured["effects_measured"]["frame_ms"].get<double>(), 0);
+    EXPECT_EQ(named(measured, "noise")["cost"], "measured");
+    // Noise of a deviation of 15 grey where the picture is not black, less what the blur takes.
+    EXPECT_GT(named(measured, "noise")["changed_part"].get<double>(), 0.3);
+    EXPECT_GT(named(measured, "noise")["rms_grey"].get<double>(), 1);
+    EXPECT_LT(named(measured, "noise")["rms_grey"].get<double>(), 15);
+    EXPECT_EQ(named(measured, "noise")["why"], "on in 3 of 3 frames: part of every picture");
+    // What cannot be left out, and what did not run, keeps its estimate and says why.
+    EXPECT_EQ(named(measured, "slice")["cost"], "estimated");
+    EXPECT_EQ(named(measured, "shadow")["cost"], "estimated");
+    EXPECT_EQ(named(measured, "shadow")["why"], "skipped: switched off");
+}
+
 TEST_F(Headless, GivesTheSameBytesTwiceAndOnTwoThreads) {
     for (const char* name : {"a", "b", "c"}) {
         const std::string threads = name[0] == 'c' ? " --threads 2" : "";

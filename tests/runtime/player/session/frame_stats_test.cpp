@@ -52,7 +52,7 @@ TEST(FrameStats, CountsCostAndSkippedFramesPerEffect) {
     for (int i = 0; i < 4; ++i) {
         costs[1].ran = i == 0;
         costs[1].ms = 1;
-        costs[1].skipped_because = i == 0 ? "" : "no needle near the plane";
+        costs[1].why = i == 0 ? "a needle" : "no needle near the plane";
         stats.add(5, costs);
     }
     const auto json = nlohmann::json::parse(stats.json(R"({"metrics": {"hits": 2}})", nullptr));
@@ -62,6 +62,9 @@ TEST(FrameStats, CountsCostAndSkippedFramesPerEffect) {
     EXPECT_EQ(json["effects"][0]["skipped_frames"], 0);
     EXPECT_EQ(json["effects"][1]["ms"], 0.25);
     EXPECT_EQ(json["effects"][1]["skipped_frames"], 3);
+    EXPECT_EQ(json["effects"][1]["cost"], "estimated");
+    EXPECT_EQ(json["effects"][1]["why"],
+              "on in 1 of 4 frames: a needle; in the others: no needle near the plane");
     EXPECT_EQ(json["metrics"]["hits"], 2);
 }
 

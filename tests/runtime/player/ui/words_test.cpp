@@ -12,6 +12,8 @@
 #include "formats/base/result.h"
 #include "formats/exercise/metric_table.h"
 #include "formats/exercise/needle_makes.h"
+#include "runtime/imaging/paper/paper_model.h"
+#include "runtime/imaging/physical/model/physical_effects.h"
 #include "runtime/player/app/attempt_result.h"
 #include "runtime/player/app/case_steps.h"
 #include "runtime/player/app/guided_start.h"
@@ -111,6 +113,30 @@ TEST(Catalogue, IsReadAsGettextReadsIt) {
     EXPECT_EQ(language.catalogue[1].english, "two lines");
     EXPECT_EQ(language.catalogue[1].other, "zwei \"Zeilen\" \\");
     EXPECT_TRUE(read_po("").catalogue.empty());
+}
+
+template <class Met, class Table>
+void expect_reasons(const Table& table) {
+    Met shows_nothing, shows_all;
+    if constexpr (requires { shows_all.shows_wall; })
+        shows_all.shows_parenchyma = shows_all.shows_streaks = shows_all.shows_diaphragm =
+            shows_all.shows_wall = true;
+    for (const auto& effect : table) {
+        EXPECT_NE(translation(effect.called_for_by), nullptr) << effect.called_for_by;
+        for (const Met& met : {shows_nothing, shows_all}) {
+            if (effect.skipped_because == nullptr) continue;
+            const char* why = effect.skipped_because(met);
+            EXPECT_NE(translation(why), nullptr) << effect.name << ": " << why;
+        }
+    }
+}
+
+// The panel of effects says why each is on or skipped.
+TEST_F(Words, EveryReasonOfAnEffectIsInTheCatalogue) {
+    expect_reasons<PaperMet>(kPaperEffects);
+    expect_reasons<PhysicalMet>(kPhysicalEffects);
+    for (const char* why : {"switched off", "needle outside the slab"})
+        EXPECT_NE(translation(why), nullptr) << why;
 }
 
 // Every tr("...") of the window's sources; words that reach tr() through a table or as a tooltip

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/export/accuracy_picture.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/base/text.h"
+#include "pipeline/pictures/chart.h"
+
+namespace sonocase::pipeline::inline exporting {
+namespace {
+
+constexpr std::size_t kPlaces = 8;  // structures that are shown
+
+std::string bar(double mm, double longest_mm) {
+    constexpr double kWidth = 32;
+    const double letters = longest_mm > 0 ? std::round(kWidth * mm / longest_mm) : 0;
+    std::string text(static_cast<std::size_t>(std::clamp(letters, 0.0, kWidth)), '#');
+    text.resize(static_cast<std::size_t>(kWidth), ' ');
+    return text;
+}
+
+ChartSheet sheet_of(const CaseAccuracy& accuracy) {
+    ChartSheet sheet;
+    sheet.columns = 3;
+    sheet.width_px = 560;
+    sheet.height_px = 420;
+    Chart parts;
+    parts.title = "Where the millimetres come from";
+    parts.x_label = "part";
+    parts.y_label = "mean displacement of surfaces, mm";
+    parts.y_log = true;  // parts differ by a hundredfold, and none may hide
+    double at = 0;
+    for (const BudgetEntry& e : accuracy.budget.entries) {
+        at += 1;
+        if (!std::isfinite(e.mm)) continue;
+        parts.series.push_back({text("%s: %s, %.2f", e.stage.c_str(), e.cause.c_str(), e.mm),
+                                {at},
+                                {e.mm},
+                                SeriesStyle::bars});
+    }
+    sheet.charts.push_back(std::move(parts));
+    if (!accuracy.places.empty()) {
+        Chart places;
+        places.title = "Known least: nine times in ten within";
+        places.x_label = "structure";
+        places.y_label = "mm";
+        Series held{"with two landmarks", {}, {}, SeriesStyle::diamonds, {27, 31, 36}, 6};
+        for (std::size_t i = 0; i < std::min(accuracy.places.size(), kPlaces); ++i) {
+            const UnknownPlace& p = accuracy.places[i];
+            places.series.push_back({text("%s, %.1f", p.label.c_str(), p.p90_mm),
+                                     {static_cast<double>(i + 1)},
+                                     {p.p90_mm},
+                                     SeriesStyle::bars});
+            if (!(p.with_landmarks_mm > 0)) continue;
+            held.x.push_back(static_cast<double>(i + 1));
+            held.y.push_back(p.with_landmarks_mm);
+        }
+        if (!held.x.empty()) places.series.push_back(std::move(held));
+        sheet.charts.push_back(std::move(places));
+    }
+    if (accuracy.points.size() > 1) {
+        Chart curve;
+        curve.title = "What seconds buy in this case";
+        curve.x_label = "seconds more than now";
+        curve.y_label = "mean displacement of surfaces, mm";
+        Series all{"voxels of the case", {}, {}, SeriesStyle::line_and_points};
+        Series now{"as it is", {}, {}, SeriesStyle::diamonds, {213, 40, 0}, 6};
+        for (const CasePoint& point : accuracy.points) {
+            if (point.landmarks) continue;
+            all.x.push_back(point.more_seconds);
+            all.y.push_back(point.error_mm);
+            if (!point.present) continue;
+            now.x.push_back(point.more_seconds);
+            now.y.push_back(point.error_mm);
+        }
+        curve.series = {std::move(all), std::move(now)};
+        for (const CasePoint& point : accuracy.points)
+            if (point.landmarks)
+                curve.series.push_back({point.setting,
+                                        {point.more_seconds},
+                                        {point.error_mm},
+                                        SeriesStyle::crosses,
+                                        {0, 158, 115},
+                                        6});
+        sheet.charts.push_back(std::move(curve));
+    }
+    sheet.columns = static_cast<int>(sheet.charts.size());
+    return sheet;
+}
+
+}  // namespace
+
+CaseAccuracy case_accuracy(const CaseBundle& bundle, std::vector<CasePoint> points) {
+    return {bundle.manifest.case_name, error_budget(bundle.manifest.stages),
+            unknown_places(bundle.manifest.stages), std::move(points)};
+}
+
+std::string accuracy_text(const CaseAccuracy& accuracy) {
+    std::string out = accuracy.case_name +
+                      "\n\nwhere its millimetres come from: mean displacement "
+                      "of surfaces\n";
+    double longest = 0;
+    for (const BudgetEntry& e : accuracy.budget.entries)
+        if (std::isfinite(e.mm)) longest = std::max(longest, e.mm);
+    for (const BudgetEntry& e : accuracy.budget.entries) {
+        if (std::isfinite(e.mm))
+            out += text("  %-9s %s %6.2f mm  %s (%s)\n", e.stage.c_str(),
+                        bar(e.mm, longest).c_str(), e.mm, e.cause.c_str(), e.basis.c_str());
+        else
+            out += text("  %-9s %-32s   ?   mm  %s: %s\n", e.stage.c_str(), "not known",
+                        e.cause.c_str(), e.basis.c_str());
+    }
+    out += text("  %-9s %-32s %6.2f mm\n", "together", "", accuracy.budget.known_mm);
+    out += "  tracker   not part of a bundle: the files of its calibration say theirs\n";
+    if (!accuracy.places.empty()) {
+        out += "\nknown least: nine times in ten within, if the patient lies as fitted\n";
+        const double worst = accuracy.places.front().p90_mm;
+        for (std::size_t i = 0; i < std::min(accuracy.places.size(), kPlaces); ++i) {
+            const UnknownPlace& p = accuracy.places[i];
+            out += text("  %-30s %s %6.1f mm", p.label.c_str(), bar(p.p90_mm, worst).c_str(),
+                        p.p90_mm);
+            if (p.with_landmarks_mm > 0)
+                out += text("  (%.1f with two landmarks)", p.with_landmarks_mm);
+            out += "\n";
+        }
+    }
+    if (!accuracy.points.empty()) {
+        out += "\nwhat seconds buy in this case, on the machine of docs/accuracy.md\n";
+        for (const CasePoint& point : accuracy.points)
+            out += text("  %-32s %+7.1f s  %6.2f mm%s\n", point.setting.c_str(), point.more_seconds,
+                        point.error_mm, point.present ? "  as it is" : "");
+    }
+    return out;
+}
+
+std::string accuracy_svg(const CaseAccuracy& accuracy) {
+    return chart_svg(sheet_of(accuracy));
+}
+
+Status write_accuracy_picture(const CaseAccuracy& accuracy, const std::string& path) {
+    if (path.ends_with(".svg")) return write_chart_svg(sheet_of(accuracy), path);
+    if (path.ends_with(".png")) return write_chart_png(sheet_of(accuracy), path);
+    return Error{"is no kind of picture that can be written", path, "end its name in .svg or .png"};
+}
+
+}  // namespace sonocase::pipeline::inline exporting
