@@ -87,6 +87,7 @@ struct BodyView {
 BodyView body_view(const CaseBundle& bundle,
                    Vector3 along,
                    Vector3 up,
-                   const std::vector<Point3>& marks);
+                   const std::vector<Point3>& marks,
+                   int height_px = 600);
 
 }  // namespace sonocase::pipeline::inline check
