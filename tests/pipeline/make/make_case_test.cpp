@@ -16,7 +16,7 @@
 #include "formats/files/load_save.h"
 #include "pipeline/anatomy/analytic_torso.h"
 #include "pipeline/check/check_case.h"
-#include "pipeline/import/volume/volume_file.h"
+#include "pipeline/import/volume/label_map.h"
 #include "support/paths.h"
 #include "support/temporary_folder.h"
 
@@ -160,6 +160,14 @@ TEST_F(MakeCase, a_study_becomes_a_case_that_its_check_calls_good_and_a_second_r
     // The place of the disc is nobody's business: it may hold a name.
     EXPECT_EQ(bundle->manifest.recipe.find(folder_.path()), std::string::npos);
 
+    // The patient's own skin: nothing moves. Its smoothing and the coarse voxels move an edge by
+    // one.
+    Box3 skin;
+    for (const Point3 p : bundle->mannequin_skin.points) skin.include(p);
+    const Box3 body = body_box(torso());
+    EXPECT_NEAR(skin.centre().x, body.centre().x, 5);
+    EXPECT_NEAR(skin.centre().y, body.centre().y, 5);
+    EXPECT_NEAR(skin.centre().z, body.centre().z, 5);
     // Needles enter through skin, and not where the scan cuts the body above and below.
     const Box3 box = bundle->grid.bounds();
     for (const EmbeddedExercise& embedded : bundle->exercises) {
