@@ -20,11 +20,16 @@ CaseLabels::CaseLabels(const CaseBundle& bundle) : bundle_(bundle) {
 }
 
 int CaseLabels::label(Point3 p) const {
-    const Point3 v = bundle_.grid.voxel_from_point(p);
-    if (!(std::abs(v.x) < 1e6) || !(std::abs(v.y) < 1e6) || !(std::abs(v.z) < 1e6)) return 0;
-    const int i = static_cast<int>(std::lround(v.x)), j = static_cast<int>(std::lround(v.y)),
-              k = static_cast<int>(std::lround(v.z));
-    return bundle_.grid.contains(i, j, k) ? bundle_.label_bricks.at(i, j, k) : 0;
+    // A bundle's grid has no direction: its axes are those of the frame.
+    const Grid& grid = bundle_.grid;
+    const double x = (p.x - grid.origin_mm.x) / grid.spacing_mm.x,
+                 y = (p.y - grid.origin_mm.y) / grid.spacing_mm.y,
+                 z = (p.z - grid.origin_mm.z) / grid.spacing_mm.z;
+    if (!(x > -0.5 && y > -0.5 && z > -0.5 && x < grid.size.x - 0.5 && y < grid.size.y - 0.5 &&
+          z < grid.size.z - 0.5))
+        return 0;
+    return bundle_.label_bricks.at(static_cast<int>(x + 0.5), static_cast<int>(y + 0.5),
+                                   static_cast<int>(z + 0.5));
 }
 
 int CaseLabels::find(const std::string& name) const {

@@ -12,6 +12,7 @@
 #include "formats/text/nearest_name.h"
 #include "pipeline/anatomy/anatomy_check.h"
 #include "pipeline/anatomy/tissue_table.h"
+#include "pipeline/base/parallel.h"
 #include "pipeline/base/text.h"
 #include "pipeline/check/aim.h"
 #include "pipeline/check/case_labels.h"
@@ -407,18 +408,16 @@ class Exercises {
         for (const Label& label : bundle.labels) names_.push_back(label.name);
     }
 
-    void check() {
-        for (const EmbeddedExercise& embedded : bundle_.exercises) {
-            const auto exercise = parse_exercise(embedded.toml, embedded.name);
-            if (!exercise) continue;  // not-valid says so
-            for (const std::string& name : exercise->no_go) expect_label(embedded.name, name);
-            for (const sonocase::Finding& finding : exercise->findings)
-                expect_label(embedded.name, finding.lesion.inside);
-            windows_.clear();
-            for (const Target& target : exercise->targets) check_target(*exercise, target);
-            play(*exercise);
-            for (const Sweep& sweep : exercise->sweeps) check_sweep(*exercise, sweep);
-        }
+    void check(const EmbeddedExercise& embedded) {
+        const auto exercise = parse_exercise(embedded.toml, embedded.name);
+        if (!exercise) return;  // not-valid says so
+        for (const std::string& name : exercise->no_go) expect_label(embedded.name, name);
+        for (const sonocase::Finding& finding : exercise->findings)
+            expect_label(embedded.name, finding.lesion.inside);
+        windows_.clear();
+        for (const Target& target : exercise->targets) check_target(*exercise, target);
+        play(*exercise);
+        for (const Sweep& sweep : exercise->sweeps) check_sweep(*exercise, sweep);
     }
 
   private:
@@ -516,7 +515,20 @@ class Exercises {
 }  // namespace
 
 void check_exercises(const CaseBundle& bundle, CheckResult& result) {
-    Exercises(bundle, result).check();
+    std::vector<CheckResult> each(bundle.exercises.size());
+    parallel_for(each.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t n = begin; n < end; ++n)
+            Exercises(bundle, each[n]).check(bundle.exercises[n]);
+    });
+    const auto append = [](auto& all, auto& part) {
+        all.insert(all.end(), part.begin(), part.end());
+    };
+    for (CheckResult& one : each) {
+        append(result.faults, one.faults);
+        append(result.remarks, one.remarks);
+        append(result.targets, one.targets);
+        append(result.exercises, one.exercises);
+    }
 }
 
 namespace {

@@ -74,6 +74,11 @@ std::string check_page(const CaseBundle& bundle,
                        const CheckResult& result,
                        const std::vector<CasePoint>& points = {});
 
+// One picture of the whole case as PNG: planes through the middle along the patient's axes with R
+// and L, views of organs and bones, and for each exercise the plane in which its first sweep
+// begins, with probe, needle and target. Cost: 0.5 s.
+std::vector<std::uint8_t> case_sheet(const CaseBundle& bundle, const CheckResult& result);
+
 // {"case", "faults": [{"name", "what", "remedy"}], "remarks", "organs", "targets", "exercises",
 // "ribs": {"right", "left"}}.
 std::string check_json(const CaseBundle& bundle, const CheckResult& result);
@@ -91,6 +96,7 @@ struct BodyView {
 BodyView body_view(const CaseBundle& bundle,
                    Vector3 along,
                    Vector3 up,
-                   const std::vector<Point3>& marks);
+                   const std::vector<Point3>& marks,
+                   int height_px = 600);
 
 }  // namespace sonocase::pipeline::inline check

@@ -8,6 +8,7 @@
 #include "formats/base/base64.h"
 #include "formats/bundle/case_bundle.h"
 #include "formats/text/number_text.h"
+#include "pipeline/base/parallel.h"
 #include "pipeline/check/case_labels.h"
 #include "pipeline/check/check_case.h"
 #include "pipeline/export/accuracy_picture.h"
@@ -21,7 +22,6 @@ extern const std::string_view kCheckPageHtml;  // check_page.html, embedded by C
 
 namespace {
 
-constexpr int kMaxPx = 600;
 constexpr double kAmbient = 0.25;
 
 // The labels that are drawn: everything but the covers of the body.
@@ -64,7 +64,8 @@ BodyView cropped(const BodyView& view) {
 BodyView body_view(const CaseBundle& bundle,
                    Vector3 along,
                    Vector3 up,
-                   const std::vector<Point3>& marks) {
+                   const std::vector<Point3>& marks,
+                   int height_px) {
     const CaseLabels labels(bundle);
     const std::vector<std::uint8_t> seen = seen_labels(labels);
     const Vector3 right = cross(along, up);
@@ -81,13 +82,13 @@ BodyView body_view(const CaseBundle& bundle,
         half_d = std::max(half_d, std::abs(dot(c, along)));
     }
     BodyView view;
-    const double mm = 2 * half_v / kMaxPx;  // per pixel
-    view.height_px = kMaxPx;
+    const double mm = 2 * half_v / height_px;  // per pixel
+    view.height_px = height_px;
     view.width_px = std::max(1, static_cast<int>(2 * half_u / mm));
     view.rgb.assign(3 * view.width_px * view.height_px, 255);
     const double step = labels.voxel_mm();
     const auto solid = [&](Point3 p) { return seen[labels.label(p)] ? 1.0 : 0.0; };
-    for (int y = 0; y < view.height_px; ++y)
+    const auto draw_row = [&](int y) {
         for (int x = 0; x < view.width_px; ++x) {
             const Point3 pixel = middle + (x * mm - half_u) * right + (half_v - y * mm) * up;
             std::uint8_t* const out = &view.rgb[3 * (y * view.width_px + x)];
@@ -114,6 +115,11 @@ BodyView body_view(const CaseBundle& bundle,
             if (body && out[0] == 255 && out[1] == 255 && out[2] == 255)
                 std::fill(out, out + 3, std::uint8_t{225});  // only covers lie here
         }
+    };
+    parallel_for(static_cast<std::size_t>(view.height_px), 16,
+                 [&](std::size_t begin, std::size_t end) {
+                     for (std::size_t y = begin; y < end; ++y) draw_row(static_cast<int>(y));
+                 });
     for (const Point3 mark : marks) {
         const Vector3 off = mark - middle;
         const int u = static_cast<int>(std::lround((dot(off, right) + half_u) / mm));

@@ -14,6 +14,7 @@ constexpr double kSpareMm = 5;       // length of the needle that stays outside,
 constexpr double kGoodEnough = 0.9;  // the search ends when this share of a path is seen
 constexpr double kRoomMm = 2;        // about a hand's tremor and a voxel
 constexpr double kRoomWorth = 0.2;   // of visibility: what a path with room may show less
+constexpr double kSkinWithinMm = 3;  // of where the body begins: a voxel and its boundary
 constexpr double kAboveMm = 40;      // where the search for the skin beside the probe begins
 constexpr double kSteepest = 0.985;  // cosine of 10 degrees: a steeper needle meets the probe
 
@@ -47,10 +48,21 @@ NeedlePlanner::NeedlePlanner(const CaseLabels& labels, const AimOptions& options
       anatomy_(labels.bundle(), options.breathing),
       sight_(&anatomy_, exercise_of(options)) {
     const std::vector<Label>& palette = labels.bundle().labels;
-    for (std::size_t l = 0; l < palette.size(); ++l)
+    has_skin_ = labels.has_skin();
+    for (std::size_t l = 0; l < palette.size(); ++l) {
+        skin_[l] = labels.is_skin(static_cast<int>(l));
         closed_[l] = labels.is_vessel(static_cast<int>(l)) ||
                      std::find(options.keep_clear.begin(), options.keep_clear.end(),
                                palette[l].name) != options.keep_clear.end();
+    }
+}
+
+// Where the scan cuts the body, it ends without skin.
+bool NeedlePlanner::through_skin(Point3 entry, Vector3 along) const {
+    if (!has_skin_) return true;
+    for (double t = 0; t <= kSkinWithinMm; t += 0.5)
+        if (skin_[static_cast<std::size_t>(anatomy_.label(entry + t * along))]) return true;
+    return false;
 }
 
 std::optional<Point3> NeedlePlanner::enter(Point3 above, Vector3 along, double reach_mm) const {
@@ -63,7 +75,7 @@ std::optional<Point3> NeedlePlanner::enter(Point3 above, Vector3 along, double r
             (anatomy_.inside(above + middle * along) ? high : low) = middle;
         }
         const Point3 skin = above + high * along;
-        if (anatomy_.at_edge(skin)) return std::nullopt;
+        if (anatomy_.at_edge(skin) || !through_skin(skin, along)) return std::nullopt;
         return skin;
     }
     return std::nullopt;

@@ -43,6 +43,7 @@ class NeedlePlanner {
                                    std::span<const Vector3> laterals) const;
 
   private:
+    bool through_skin(Point3 entry, Vector3 along) const;
     bool free(Point3 entry, Vector3 along, double length_mm, int own) const;
     bool roomy(const NeedlePlan& plan, double length_mm, int own) const;
     std::optional<Point3> enter(Point3 above, Vector3 along, double reach_mm) const;
@@ -52,6 +53,8 @@ class NeedlePlanner {
     CaseAnatomy anatomy_;
     NeedleSight sight_;               // of anatomy_
     std::array<bool, 256> closed_{};  // labels that no needle may pass
+    std::array<bool, 256> skin_{};    // labels that are skin
+    bool has_skin_ = false;
 };
 
 // The pose of a probe whose face has its middle at `skin`.

@@ -101,6 +101,13 @@ CaseSize case_size(const Recipe& recipe) {
     } else {
         const VolumeSize labels = size_in_headers(recipe.resolve(recipe.inputs.labels));
         size.label_mb = static_cast<double>(labels.bytes) / 1e6;
+        // Its voxels in its own type, as 16-bit numbers, and those on the grid of the labels.
+        if (!recipe.inputs.scan.empty())
+            size.label_mb +=
+                (static_cast<double>(size_in_headers(recipe.resolve(recipe.inputs.scan)).bytes) *
+                     2 +
+                 4 * static_cast<double>(labels.voxels)) /
+                1e6;
         size.label_voxels = static_cast<double>(labels.voxels) / 1e6;
         size.interpolated_nodes =
             nodes_between_slices(labels.spacing_mm, static_cast<double>(labels.voxels));
@@ -118,6 +125,16 @@ CaseSize case_size(const Recipe& recipe) {
 }
 
 Result<double> cooked_volume_mm3(const Recipe& recipe) {
+    if (recipe.inputs.own_skin) {  // the map's box, which is no smaller than that of its body
+        const std::string labels = recipe.resolve(recipe.inputs.labels);
+        if (is_mesh_source(labels)) {
+            SONOCASE_TRY(const auto grid, mesh_inputs_grid(recipe));
+            return static_cast<double>(grid.voxel_count()) * grid.voxel_volume_mm3();
+        }
+        const VolumeSize size = size_in_headers(labels);
+        const Vector3 step = recipe.inputs.labels_scale * size.spacing_mm;
+        return static_cast<double>(size.voxels) * step.x * step.y * step.z;
+    }
     SONOCASE_TRY(auto mannequin, read_mannequin(recipe));
     const Vector3 e = extent_of(mannequin.surface);
     return e.x * e.y * e.z;

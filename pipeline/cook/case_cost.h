@@ -16,8 +16,9 @@ namespace sonocase::pipeline::inline cook {
 // round a label it imports the label map itself.
 CaseSize case_size(const Recipe& recipe);
 
-// Returns the volume of the grid that cooking would fill, by the mannequin's extent alone. Errors:
-// those of reading the mannequin.
+// Returns the volume of the grid that cooking would fill, by the mannequin's extent alone; of a
+// case on the patient's own skin at most that of the label map, by its header. Errors: those of
+// reading the mannequin.
 Result<double> cooked_volume_mm3(const Recipe& recipe);
 
 struct MemoryNeed {

@@ -52,6 +52,7 @@ Result<InputDigests> digest_inputs(const Recipe& recipe, const DigestOfInput& di
     };
     for (const Item& item : {Item{in.labels, inputs.labels},
                              {in.label_table, inputs.label_table},
+                             {in.scan, inputs.scan},
                              {in.surface, inputs.surface},
                              {in.examples, inputs.examples},
                              {in.landmarks, inputs.landmarks},

@@ -7,9 +7,10 @@ namespace {
 
 StageTable make_table() {
     StageTable table;
-    table.stages = {mannequin_step(), import_stage(),    surface_stage(),   warp_stage(),
-                    resample_stage(), smooth_stage(),    pathology_stage(), tissues_step(),
-                    texture_stage(),  structure_stage(), flow_stage(),      pack_stage()};
+    table.stages = {mannequin_step(), import_stage(),   surface_stage(),   own_skin_step(),
+                    warp_stage(),     resample_stage(), smooth_stage(),    pathology_stage(),
+                    tissues_step(),   texture_stage(),  structure_stage(), flow_stage(),
+                    pack_stage()};
     table.common = OptionsOf<CaseOptions>("case").number(
         "seed", [](auto& o) { return &o.seed; }, 0, 2e9, "",
         "seed of everything random in the case");

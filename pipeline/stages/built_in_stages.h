@@ -18,6 +18,7 @@ const StageTable& built_in_stages();
 StageDescriptor mannequin_step();
 StageDescriptor import_stage();
 StageDescriptor surface_stage();
+StageDescriptor own_skin_step();
 StageDescriptor warp_stage();
 StageDescriptor resample_stage();
 StageDescriptor smooth_stage();

@@ -5,6 +5,7 @@
 
 #include "formats/files/load_save.h"
 #include "pipeline/anatomy/anatomy_check.h"
+#include "pipeline/import/body/scan_body.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/case_tissues.h"
 #include "pipeline/stages/label_codec.h"
@@ -151,7 +152,8 @@ std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& dig
         return {key_text(body.tubes ? "tubes" : "analytic",
                          {body.width_scale, body.depth_scale, body.belly_mm, in.torso.voxel_mm,
                           in.torso.slice_mm, static_cast<double>(body.neck_seed)})};
-    const std::string files = digests.labels + " " + digests.label_table;
+    std::string files = digests.labels + " " + digests.label_table;
+    if (!in.scan.empty()) files += " " + digests.scan + " " + std::to_string(kScanBodyVersion);
     if (is_mesh_source(recipe.resolve(in.labels)))
         return {key_text(files + " axes " + in.labels_axes,
                          {in.labels_scale, kMeshImportVersion, kAnatomyCheckVersion})};
@@ -171,6 +173,10 @@ StageVerb verb() {
          "Names of the values: rows of value,name[,tissue_class], or a table of ITK-SNAP, Slicer, "
          "FreeSurfer or nnU-Net; of meshes: node,label,role",
          false, &RecipeInputs::label_table},
+        {"--scan", "FILE",
+         "The CT that the map was drawn on, DICOM folder or file: what the map leaves of the body "
+         "without a label is filled in by density",
+         false, &RecipeInputs::scan},
         {"--scale", "", "Millimetres per unit of the file", false, &RecipeInputs::labels_scale},
         {"--names", "", "Whose numbers the values are that neither the file nor a table names",
          false, &RecipeInputs::label_names, names_options()},
@@ -204,6 +210,8 @@ Result<ImportedLabels> read_inputs(const Recipe& recipe,
     const RecipeInputs& in = recipe.inputs;
     const std::string path = recipe.resolve(in.labels), table = recipe.resolve(in.label_table);
     if (is_mesh_source(path)) {
+        if (!in.scan.empty())
+            return Error{"organ meshes with a scan", path, "leave out inputs.scan"};
         MeshImportOptions options = given;
         options.mesh.scale = in.labels_scale;
         options.mesh.axes = axes_named(in.labels_axes);
@@ -220,7 +228,14 @@ Result<ImportedLabels> read_inputs(const Recipe& recipe,
                                   : in.orientation == "qform" ? Orientation::qform
                                                               : Orientation::automatic;
     options.reading.resample_shear = in.resample_shear;
-    return import_label_map(path, options, progress);
+    SONOCASE_TRY(auto imported, import_label_map(path, options, progress));
+    if (in.scan.empty()) return imported;
+    const std::string scan_path = recipe.resolve(in.scan);
+    report_progress(progress, 0.7, "reading the scan");
+    SONOCASE_TRY(const auto scan, read_scan(scan_path, options.reading));
+    report_progress(progress, 0.8, "filling in the body");
+    SONOCASE_TRY_DONE(fill_from_scan(scan, scan_path, imported));
+    return imported;
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "pipeline/import/mesh/surface_file.h"
+#include "pipeline/registration/skin/skin_surface.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/roles.h"
 #include "pipeline/stages/stage_table.h"
@@ -61,6 +62,7 @@ StageDescriptor mannequin_step() {
     StageDescriptor step;
     step.name = "mannequin";
     step.provides = kMannequin;
+    step.active = [](const Recipe& recipe) { return !recipe.inputs.own_skin; };
     step.key_texts = key_texts;
     step.run = run;
     step.warnings = [](const StageValue& value) {
@@ -78,6 +80,20 @@ StageDescriptor mannequin_step() {
         if (const auto unit = said("unit"); unit != notes.end())
             warnings.push_back("surface: " + unit->text);
         return warnings;
+    };
+    return step;
+}
+
+// The patient's own skin stands for the mannequin: the frame `mannequin` is then `ct`.
+StageDescriptor own_skin_step() {
+    StageDescriptor step;
+    step.name = "own_skin";
+    step.takes = {kSkin};
+    step.provides = kMannequin;
+    step.active = [](const Recipe& recipe) { return recipe.inputs.own_skin; };
+    step.run = [](StageInputs& inputs, const Progress&) -> Result<StageValue> {
+        SONOCASE_TRY(const auto skin, inputs.get(kSkin));
+        return StageValue::of(kMannequin, Mannequin{skin->skin, {}});
     };
     return step;
 }

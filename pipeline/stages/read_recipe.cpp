@@ -79,7 +79,9 @@ void read_tissue(const TomlTable& table, const std::string& name, std::vector<Ti
 void read_inputs(const TomlTable& table, RecipeInputs& inputs) {
     table.text("labels", inputs.labels);
     table.text("label_table", inputs.label_table);
+    table.text("scan", inputs.scan);
     table.text("surface", inputs.surface);
+    table.flag("own_skin", inputs.own_skin);
     table.text("examples", inputs.examples);
     table.text("landmarks", inputs.landmarks);
     table.text("surface_landmarks", inputs.surface_landmarks);
@@ -202,8 +204,12 @@ Status check_inputs(const Recipe& recipe) {
     if (in.analytic) return Done{};
     if (in.labels.empty())
         return Error{"no inputs.labels", recipe.path, "expected the label map of a torso"};
-    if (in.surface.empty())
-        return Error{"no inputs.surface", recipe.path, "expected the digitised mannequin"};
+    if (in.own_skin && !in.surface.empty())
+        return Error{"both a surface and own_skin in [inputs]", recipe.path,
+                     "keep the mannequin's surface, or the patient's own skin"};
+    if (in.surface.empty() && !in.own_skin)
+        return Error{"no inputs.surface", recipe.path,
+                     "expected the digitised mannequin, or own_skin = true"};
     return Done{};
 }
 
@@ -306,6 +312,7 @@ Status read_text(std::string_view text,
             return Error{"the analytic torso makes its own mannequin", "--surface",
                          "take a recipe with [inputs]"};
         recipe.inputs.surface = fs::absolute(overrides.surface).string();
+        recipe.inputs.own_skin = false;
     }
     return check_inputs(recipe);
 }

@@ -93,7 +93,9 @@ struct RecipeInputs {
     AnalyticInput torso;  // where analytic
     std::string labels;   // as the recipe names them; Recipe::resolve finds the file
     std::string label_table;
+    std::string scan;  // the CT that the map was drawn on: fills in the body; empty: none
     std::string surface;
+    bool own_skin = false;  // no mannequin: the case lies on the patient's own skin, in `ct`
     std::string examples;   // folder of ultrasound patches; empty: synthetic examples
     std::string landmarks;  // CSV of name,ct_x,ct_y,ct_z,x,y,z; or the patient's marks alone, and
     std::string surface_landmarks;  // those of the same names on the surface
@@ -134,7 +136,8 @@ struct Recipe {
 // Content hashes of the files that a recipe names; empty where it names none.
 struct InputDigests {
     std::string labels, label_table, surface, examples, landmarks;
-    std::vector<InputHash> files;  // those named, in this order
+    std::vector<InputHash> files;  // those named, in this order; the scan after the table
+    std::string scan;
 };
 
 }  // namespace sonocase::pipeline::inline stages

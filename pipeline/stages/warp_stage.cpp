@@ -7,6 +7,7 @@
 #include "pipeline/registration/landmark_file.h"
 #include "pipeline/registration/map/registration.h"
 #include "pipeline/registration/register_surfaces.h"
+#include "pipeline/registration/skin/skin_surface.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/label_codec.h"
 #include "pipeline/stages/mannequin_step.h"
@@ -167,8 +168,30 @@ Registration known_map(const AnalyticInput& torso) {
     return registration;
 }
 
+// The map of a case on the patient's own skin: every point stays where the scan has it.
+Registration identity_map(const Box3& ct_box) {
+    Registration registration;
+    registration.quadratic = QuadraticMap::from_rigid({}, {}, 1);
+    registration.ct_box = ct_box;
+    registration.min_det_jacobian = 1;
+    StageReport report;
+    report.stage = stage_names::kWarp;
+    report.version = kRegisterVersion;
+    report.measures = {{"min_det_jacobian", 1}};
+    report.notes = {{"path", "own_skin"},
+                    {"mannequin",
+                     "none: the case lies on the patient's own skin; give a surface "
+                     "to fit it to a mannequin"}};
+    registration.reports = {report};
+    return registration;
+}
+
 Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
     const Recipe& recipe = inputs.recipe();
+    if (recipe.inputs.own_skin) {
+        SONOCASE_TRY(const auto own, inputs.get(kSkin));
+        return StageValue::of(kRegistration, identity_map(own->box));
+    }
     SONOCASE_TRY(const auto mannequin, inputs.get(kMannequin));
     SONOCASE_TRY(const auto skin, inputs.get(kSkin));
     const Surface& surface = mannequin->surface;
@@ -192,6 +215,8 @@ std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& dig
     std::string hint;
     if (in.analytic && in.torso.known_map)
         hint = "known";
+    else if (in.own_skin)
+        hint = "own_skin";
     else if (in.up)
         hint = key_text("up", {in.up->x, in.up->y, in.up->z});
     return {digests.landmarks, hint};

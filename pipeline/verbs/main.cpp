@@ -34,6 +34,7 @@ struct Verb {
 
 const std::vector<Verb>& hand_written_verbs() {
     static const std::vector<Verb> table{
+        {kCase, "make", "turn a scan and its labels into a case to try", verb_make, ""},
         {kCase, "build", "cook a recipe into a case bundle", verb_build, ""},
         {kCase, "inspect", "show what a bundle holds", verb_inspect, ""},
         {kCase, "validate", "check a bundle", verb_validate, ""},

@@ -3,6 +3,7 @@
 #include "pipeline/verbs/verb_common.h"
 
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <span>
@@ -142,6 +143,8 @@ void print_warnings(const char* verb, const StageReport& report) {
 struct ProgressBar::State {
     using Clock = std::chrono::steady_clock;
     bool shown = false;
+    bool tells_time = false;
+    const Clock::time_point began = Clock::now();
     bool drawn = false;
     Clock::time_point last{};
 
@@ -155,14 +158,21 @@ struct ProgressBar::State {
         const int full = static_cast<int>(clamped * kWidth);
         std::string bar(full, '#');
         bar.resize(kWidth, ' ');
-        std::fprintf(stderr, "\r[%s] %3d%% %.*s\x1b[K", bar.c_str(),
-                     static_cast<int>(clamped * 100),
-                     static_cast<int>(std::min<std::size_t>(doing.size(), 44)), doing.data());
+        std::string left;
+        const double seconds = std::chrono::duration<double>(now - began).count();
+        if (tells_time && seconds > 2 && clamped > 0.02)
+            left =
+                ", about " + std::to_string(std::lround(seconds * (1 / clamped - 1))) + " s left";
+        std::fprintf(
+            stderr, "\r[%s] %3d%% %.*s%s\x1b[K", bar.c_str(), static_cast<int>(clamped * 100),
+            static_cast<int>(std::min<std::size_t>(doing.size(), 44)), doing.data(), left.c_str());
         std::fflush(stderr);
     }
 };
 
-ProgressBar::ProgressBar(const CommonOptions& options) : state_(std::make_unique<State>()) {
+ProgressBar::ProgressBar(const CommonOptions& options, bool tells_time)
+    : state_(std::make_unique<State>()) {
+    state_->tells_time = tells_time;
     state_->shown = !options.quiet && isatty(STDERR_FILENO) != 0;
 }
 

@@ -51,7 +51,9 @@ void print_warnings(const char* verb, const StageReport& report);
 // second, and clears its line when it goes out of scope.
 class ProgressBar {
   public:
-    explicit ProgressBar(const CommonOptions& options);
+    // tells_time  says how long it will go on, as the share that is done takes as long as it did;
+    //             for work whose shares were measured
+    explicit ProgressBar(const CommonOptions& options, bool tells_time = false);
     ~ProgressBar();
     ProgressBar(const ProgressBar&) = delete;
     ProgressBar& operator=(const ProgressBar&) = delete;

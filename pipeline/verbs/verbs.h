@@ -42,6 +42,7 @@ int verb_export(int argc, char** argv);
 int verb_inspect(int argc, char** argv);
 int verb_landmarks(int argc, char** argv);
 int verb_look(int argc, char** argv);
+int verb_make(int argc, char** argv);
 int verb_map(int argc, char** argv);
 int verb_markers(int argc, char** argv);
 int verb_pack(int argc, char** argv);

@@ -34,14 +34,15 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr DicomTag kImageType = 0x00080008, kSopClass = 0x00080016, kModality = 0x00080060,
-                   kDescription = 0x0008103e, kReferencedSeries = 0x00081115, kSeries = 0x0020000e,
-                   kAcquisition = 0x00200012, kNumber = 0x00200013, kFrameOfReference = 0x00200052,
-                   kInAcquisition = 0x00201002, kInSeries = 0x00201209, kSamples = 0x00280002,
-                   kFrames = 0x00280008, kRows = 0x00280010, kColumns = 0x00280011,
-                   kBits = 0x00280100, kStored = 0x00280101, kHighBit = 0x00280102,
-                   kSigned = 0x00280103, kIntercept = 0x00281052, kSlope = 0x00281053,
-                   kLossy = 0x00282110, kTransformation = 0x00289145, kShared = 0x52009229,
-                   kPerFrame = 0x52009230, kSlices = 0x00540081;
+                   kPatient = 0x00100020, kDescription = 0x0008103e, kReferencedSeries = 0x00081115,
+                   kSeries = 0x0020000e, kAcquisition = 0x00200012, kNumber = 0x00200013,
+                   kFrameOfReference = 0x00200052, kInAcquisition = 0x00201002,
+                   kInSeries = 0x00201209, kSamples = 0x00280002, kFrames = 0x00280008,
+                   kRows = 0x00280010, kColumns = 0x00280011, kBits = 0x00280100,
+                   kStored = 0x00280101, kHighBit = 0x00280102, kSigned = 0x00280103,
+                   kIntercept = 0x00281052, kSlope = 0x00281053, kLossy = 0x00282110,
+                   kTransformation = 0x00289145, kShared = 0x52009229, kPerFrame = 0x52009230,
+                   kSlices = 0x00540081;
 
 DicomSlice slice_of(const DicomSet& set) {
     DicomSlice slice;
@@ -50,6 +51,7 @@ DicomSlice slice_of(const DicomSet& set) {
     slice.modality = text_of(set, kModality);
     slice.description = text_of(set, kDescription);
     slice.frame_of_reference = text_of(set, kFrameOfReference);
+    slice.patient = text_of(set, kPatient);
     slice.rows = short_of(set, kRows);
     slice.columns = short_of(set, kColumns);
     slice.frames = frames_of(set, std::max(1, whole_of(set, kFrames)));
@@ -83,6 +85,7 @@ DicomObject object_of(const DicomSet& set, const std::string& path) {
     object.path = path;
     object.modality = text_of(set, kModality);
     object.frame_of_reference = text_of(set, kFrameOfReference);
+    object.patient = text_of(set, kPatient);
     const std::vector<DicomSet> series = items_of(set, kReferencedSeries);
     if (!series.empty()) object.series = text_of(series.front(), kSeries);
     return object;
@@ -855,6 +858,19 @@ VolumeSize size_in_dicom(const std::string& path) {
             static_cast<std::uint64_t>(slice.rows) * static_cast<std::uint64_t>(slice.columns);
     size.bytes = 2 * size.voxels;  // CT and most others have two bytes per voxel
     return size;
+}
+
+Result<NativeVolume> read_dicom_scan(const std::string& path, bool resample_shear) {
+    const QuietLibrary quiet;
+    itk::Object::GlobalWarningDisplayOff();
+    try {
+        const DicomFolder folder = read_dicom_headers(path);
+        if (folder.slices.empty()) return Error{"holds no slices of a scan", path, "expected a CT"};
+        SONOCASE_TRY(const auto stack, dicom_stack(folder.slices, path));
+        return read_stack(stack, resample_shear, path);
+    } catch (const std::exception&) {
+        return damaged(path);
+    }
 }
 
 Result<NativeVolume> read_dicom(const std::string& path, bool resample_shear) {

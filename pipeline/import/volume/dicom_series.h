@@ -53,6 +53,7 @@ struct DicomSlice {
     std::string series;       // Series Instance UID
     std::string acquisition;  // Acquisition Number
     std::string modality, description, frame_of_reference;
+    std::string patient;  // Patient ID
     int rows = 0, columns = 0;
     std::vector<DicomFrame> frames;  // one, of an object of several frames all
     int of_frame = 0;      // a frame of an object of several, from 1; 0: the only one of its file
@@ -72,6 +73,7 @@ struct DicomObject {
     std::string frame_of_reference = {};  // Frame of Reference UID
     std::string series = {};              // Series Instance UID of the images that it refers to
     bool cut_off = false;                 // a segmentation that ends before its pixels do
+    std::string patient = {};             // Patient ID
 };
 
 struct DicomFolder {

@@ -116,6 +116,8 @@ Result<NativeVolume> read_itk_volume(const std::string& path,
 // scan that it was drawn on or alone; or a folder's largest series. resample_shear: slices of a
 // tilted gantry are moved by whole pixels; else they are an error.
 Result<NativeVolume> read_dicom(const std::string& path, bool resample_shear = false);
+// The largest series of slices, whatever segmentation lies beside it.
+Result<NativeVolume> read_dicom_scan(const std::string& path, bool resample_shear);
 VolumeSize size_in_dicom(const std::string& path);  // by headers alone
 
 // How to permute and flip the axes of a grid so that they lie nearest to those of its frame.

@@ -339,4 +339,49 @@ Result<LabelLayers> read_label_layers(const std::string& path, const VolumeReadi
     return result;
 }
 
+Result<ScanVolume> read_scan(const std::string& path, const VolumeReading& reading) {
+    std::error_code code;
+    const bool folder = fs::is_directory(path, code);
+    SONOCASE_TRY(auto native, folder ? read_dicom_scan(path, reading.resample_shear)
+                                     : read_native(path, reading));
+    if (native.layers != 1)
+        return Error{"scan of " + std::to_string(native.layers) + " values per voxel", path,
+                     "expected one: a CT"};
+    if (native.slanted)
+        return Error{"scan whose axes are not at right angles", path,
+                     "resample it to straight slices"};
+    const AxisOrder order = canonical_axes(native.grid.direction);
+    const AxisWalk steps = axis_walk(native.grid, order);
+    ScanVolume scan;
+    scan.grid = reoriented(native.grid, order);
+    scan.warnings = std::move(native.warnings);
+    scan.values.resize(scan.grid.voxel_count());
+    const double slope = native.slope, intercept = native.intercept;
+    with_voxels(native, [&](const auto* voxels) {
+        walk(scan.grid, steps, [&](std::size_t to, std::size_t from) {
+            const double value = slope * static_cast<double>(voxels[from]) + intercept;
+            // Comparisons with what is not a number are false: it becomes the least.
+            scan.values[to] = static_cast<std::int16_t>(
+                value > -32768 ? std::lround(std::min(value, 32767.0)) : -32768);
+        });
+    });
+    return scan;
+}
+
+Result<bool> holds_labels(const std::string& path, const VolumeReading& reading) {
+    SONOCASE_TRY(const auto native, read_native(path, reading));
+    const Scale scale = scale_of(native);
+    const std::size_t count = native.bytes.size() / bytes_of(native.component);
+    return with_voxels(native, [&](const auto* voxels) {
+        ValueTable table;
+        for (std::size_t n = 0; n < count; ++n) {
+            std::int32_t value = 0;
+            if (n > 0 && voxels[n] == voxels[n - 1]) continue;
+            if (!whole_number(voxels[n], scale, &value) || value < 0 || table.place(value) < 0)
+                return false;
+        }
+        return true;
+    });
+}
+
 }  // namespace sonocase::pipeline::inline import_volume

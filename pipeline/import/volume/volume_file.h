@@ -47,6 +47,22 @@ struct LabelLayers {
 // and one byte each.
 Result<LabelLayers> read_label_layers(const std::string& path, const VolumeReading& reading = {});
 
+// A scan: values in Hounsfield units where it is a CT, rounded to whole numbers of 16 bits.
+struct ScanVolume {
+    Grid grid;
+    std::vector<std::int16_t> values;
+    std::vector<std::string> warnings;
+};
+
+// Reads a NIfTI, NRRD or MetaImage file, or the largest series of a DICOM folder, whatever
+// segmentation lies beside it. Errors: as those of read_label_layers; several values per voxel.
+// Memory: the file's voxels in its own type and two bytes each.
+Result<ScanVolume> read_scan(const std::string& path, const VolumeReading& reading = {});
+
+// Whether the voxels are labels, as read_label_layers takes them, and not those of a scan: few
+// whole numbers of which none is below 0. Errors: it cannot be read. Cost: that of reading it.
+Result<bool> holds_labels(const std::string& path, const VolumeReading& reading = {});
+
 // The number of voxels of a file or of a folder with a DICOM series, and the bytes that they take
 // in their own type. Only headers are read. For a folder of masks, those of one mask. 0: they
 // cannot be read.

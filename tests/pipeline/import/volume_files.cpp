@@ -295,6 +295,8 @@ std::string dicom_slice(const TinyVolume& volume,
         element(0x20, 0x32, "DS",
                 !counts.position.empty() ? counts.position : numbers({-at.x, -at.y, at.z}, "\\"));
     bytes += orientation(volume);
+    if (!counts.frame_of_reference.empty())
+        bytes += element(0x20, 0x52, "UI", counts.frame_of_reference);
     if (counts.in_acquisition > 0)
         bytes += element(0x20, 0x1002, "IS", std::to_string(counts.in_acquisition));
     if (counts.in_series > 0)
@@ -311,7 +313,9 @@ std::string dicom_slice(const TinyVolume& volume,
     const std::size_t slice = static_cast<std::size_t>(volume.size.x) * volume.size.y;
     const auto unused = static_cast<std::uint16_t>(0xffff << stored);
     for (std::size_t n = 0; n < slice; ++n)
-        pixels += us(static_cast<std::uint16_t>(volume.voxels[k * slice + n] | unused));
+        pixels += us(static_cast<std::uint16_t>(counts.values.empty()
+                                                    ? volume.voxels[k * slice + n] | unused
+                                                    : counts.values[k * slice + n]));
     return bytes + element(0x7fe0, 0x10, "OW", pixels);
 }
 
@@ -329,6 +333,7 @@ std::string dicom_object(const TinyVolume& volume, const TinyObject& object) {
                      !object.modality.empty() ? object.modality
                      : scan                   ? "CT"
                                               : "SEG");
+    if (!object.patient.empty()) bytes += element(0x10, 0x20, "LO", object.patient);
     std::string measures;
     if (object.thickness_mm != 0)
         measures += element(0x18, 0x50, "DS", numbers({object.thickness_mm}, ""));

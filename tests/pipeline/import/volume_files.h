@@ -56,7 +56,9 @@ struct DicomCounts {
     std::string position, thickness;        // texts instead of the true ones
     int stored_bits = 16;                   // the upper bits of each pixel are set if fewer
     bool is_signed = false;
+    std::vector<std::int16_t> values = {};  // of all voxels, instead of the volume's own
     std::string person;  // in every element that names or describes the patient; empty: none
+    std::string frame_of_reference;
 };
 // One slice of an uncompressed DICOM series of unsigned 16-bit values, explicit little-endian.
 std::string dicom_slice(const TinyVolume& volume,
@@ -85,6 +87,7 @@ struct TinyObject {
     std::string modality;                          // empty: by the kind
     std::string packing;                           // "run lengths", "deflate"; empty: none
     std::string frame_of_reference = "1.2.3.7";
+    std::string patient;
 };
 std::string dicom_object(const TinyVolume& volume, const TinyObject& object);
 

@@ -153,6 +153,21 @@ TEST(Recipe, FaultsOfTheHeadAndOfTheCommandLine) {
     EXPECT_NE(parse(kGood, overrides).error().message().find("accurate"), std::string::npos);
 }
 
+TEST(Recipe, OwnSkinStandsForTheMannequinUntilThereIsOne) {
+    const std::string own = "[inputs]\nlabels = \"a.nii\"\nscan = \"ct\"\nown_skin = true\n";
+    const auto recipe = parse(own);
+    ASSERT_TRUE(recipe.has_value()) << recipe.error().message();
+    EXPECT_TRUE(recipe->inputs.own_skin);
+    EXPECT_EQ(recipe->inputs.scan, "ct");
+    EXPECT_NE(parse(own + "surface = \"b.ply\"\n").error().message().find("own_skin"),
+              std::string::npos);
+    RecipeOverrides overrides;
+    overrides.surface = "b.ply";  // --surface
+    const auto fitted = parse(own, overrides);
+    ASSERT_TRUE(fitted.has_value()) << fitted.error().message();
+    EXPECT_FALSE(fitted->inputs.own_skin);
+}
+
 TEST(Recipe, PathsStartFromDataThenFromTheRecipe) {
     const TemporaryFolder folder;
     folder.write("data/in_data.nii", "x");

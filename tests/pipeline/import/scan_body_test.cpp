@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "pipeline/import/body/scan_body.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "support/paths.h"
+
+namespace sonocase::pipeline {
+namespace {
+
+// A body of 200 x 140 x 60 mm: fat about muscle, gas in a gut, a liver; on a table of 12 mm that
+// touches its back. Voxels of 4 mm.
+struct Study {
+    ScanVolume scan;
+    ImportedLabels imported;
+};
+
+bool in_body(Point3 p) {
+    return std::hypot(p.x / 100, p.y / 70) < 1;
+}
+
+Study study() {
+    Study s;
+    Grid grid;
+    grid.size = {60, 50, 15};
+    grid.spacing_mm = {4, 4, 4};
+    grid.origin_mm = {-118, -98, 0};
+    s.scan.grid = s.imported.labels.grid = grid;
+    s.imported.labels.labels = {
+        {"outside", "outside", 0, {}}, {"liver", "liver", 5, {}}, {"colon", "bowel", 20, {}}};
+    for (int k = 0; k < grid.size.z; ++k)
+        for (int j = 0; j < grid.size.y; ++j)
+            for (int i = 0; i < grid.size.x; ++i) {
+                const Point3 p = grid.point_from_voxel({double(i), double(j), double(k)});
+                const bool liver = std::hypot(p.x - 30, p.y) < 25,
+                           gut = std::hypot(p.x + 40, p.y) < 20;
+                const bool inner = std::hypot(p.x / 80, p.y / 50) < 1;
+                const bool table = p.y < -70 && p.y > -84 && std::abs(p.x) < 90;
+                const bool body = in_body(p);
+                s.scan.values.push_back(
+                    static_cast<std::int16_t>(!body ? (table ? 100 : -1000)
+                                              : gut && std::hypot(p.x + 40, p.y) < 12 ? -900
+                                              : liver || gut                          ? 60
+                                              : inner                                 ? 40
+                                                                                      : -100));
+                s.imported.labels.voxels.push_back(!body ? 0 : liver ? 1 : gut ? 2 : 0);
+            }
+    return s;
+}
+
+int label_at(const LabelVolume& labels, Point3 p) {
+    const Point3 v = labels.grid.voxel_from_point(p);
+    return labels.voxels[labels.grid.index(static_cast<int>(std::lround(v.x)),
+                                           static_cast<int>(std::lround(v.y)),
+                                           static_cast<int>(std::lround(v.z)))];
+}
+std::string name_at(const LabelVolume& labels, Point3 p) {
+    return labels.labels[static_cast<std::size_t>(label_at(labels, p))].name;
+}
+
+TEST(ScanBody, what_organs_leave_is_filled_by_density_and_the_table_is_not) {
+    Study s = study();
+    const auto filled = fill_from_scan(s.scan, "ct", s.imported);
+    ASSERT_TRUE(filled) << filled.error().message();
+    const LabelVolume& labels = s.imported.labels;
+    EXPECT_EQ(name_at(labels, {30, 0, 30}), "liver");
+    EXPECT_EQ(name_at(labels, {-40, 0, 30}), "gas_in_body");  // within the colon's label
+    EXPECT_EQ(name_at(labels, {-40, 16, 30}), "colon");
+    EXPECT_EQ(name_at(labels, {0, 20, 30}), "other_muscle");
+    EXPECT_EQ(name_at(labels, {0, 58, 30}), "other_fat");
+    EXPECT_EQ(name_at(labels, {0, 66, 30}), "skin");
+    EXPECT_EQ(name_at(labels, {60, -78, 30}), "outside");  // the table
+    double ml = 0;
+    for (const Measure& m : s.imported.report.measures)
+        if (m.name == "scan_body_ml") ml = m.value;
+    // The ellipse's area times the height; its edge is known to half a voxel: 2 of 70 mm.
+    EXPECT_NEAR(ml, 3.14159 * 100 * 70 * 60 / 1000, 0.06 * 1320);
+    for (const Label& label : labels.labels) EXPECT_NE(label.name, "other_bone");  // not used
+}
+
+TEST(ScanBody, a_map_of_the_whole_body_stays_as_it_is) {
+    Study s = study();
+    ASSERT_TRUE(fill_from_scan(s.scan, "ct", s.imported));
+    const std::vector<std::uint8_t> whole = s.imported.labels.voxels;
+    const std::size_t count = s.imported.labels.labels.size();
+    ASSERT_TRUE(fill_from_scan(s.scan, "ct", s.imported));
+    EXPECT_EQ(s.imported.labels.voxels, whole);
+    EXPECT_EQ(s.imported.labels.labels.size(), count);
+    EXPECT_NE(s.imported.report.notes.back().text.find("not needed"), std::string::npos);
+}
+
+TEST(ScanBody, a_scan_of_another_place_or_without_hounsfield_units_is_refused) {
+    Study moved = study();
+    moved.scan.grid.origin_mm.x += 300;
+    auto refused = fill_from_scan(moved.scan, "ct", moved.imported);
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().what.find("covers"), std::string::npos);
+    Study mr = study();
+    for (std::int16_t& value : mr.scan.values) value = static_cast<std::int16_t>(value + 1000);
+    refused = fill_from_scan(mr.scan, "mr", mr.imported);
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().expected.find("Hounsfield"), std::string::npos);
+}
+
+// The map that the shared data were completed to by another program, by the same rule.
+TEST(ScanBody, the_shared_ct_becomes_the_body_that_its_makers_have) {
+    const std::string ct = SONOCASE_DATA "/ct";
+    if (!std::filesystem::exists(ct)) GTEST_SKIP() << "shared/data/ct is absent";
+    auto imported = import_label_map(ct + "/labels_source.nii.gz");
+    ASSERT_TRUE(imported);
+    const auto scan = read_scan(ct + "/ct.nii.gz");
+    ASSERT_TRUE(scan);
+    ASSERT_TRUE(fill_from_scan(*scan, "ct", *imported));
+    const auto whole = import_label_map(ct + "/labels.nii.gz");
+    ASSERT_TRUE(whole);
+    std::size_t both = 0, either = 0;
+    for (std::size_t n = 0; n < whole->labels.voxels.size(); ++n) {
+        const bool a = imported->labels.voxels[n] != 0, b = whole->labels.voxels[n] != 0;
+        both += a && b;
+        either += a || b;
+    }
+    // Two programs that open and fill by other shapes differ along the skin's edge.
+    EXPECT_GT(static_cast<double>(both) / static_cast<double>(either), 0.99);
+}
+
+}  // namespace
+}  // namespace sonocase::pipeline
