@@ -73,10 +73,11 @@ struct DopplerOptions {
         app.add_option("--scale", doppler.scale_cm_s, "Nyquist velocity of the colour box, cm/s")
             ->check(CLI::Range(1.0, 500.0))
             ->group("Doppler");
-        app.add_option("--spectral-scale", doppler.spectral_scale_cm_s,
-                       "Nyquist velocity of the spectrum, cm/s")
-            ->check(CLI::Range(1.0, 1000.0))
-            ->group("Doppler");
+        spectral_scale = app.add_option("--spectral-scale", doppler.spectral_scale_cm_s,
+                                        "Nyquist velocity of the spectrum, cm/s; default: by the "
+                                        "fastest blood of the vessel aimed at, else 100")
+                             ->check(CLI::Range(1.0, 1000.0))
+                             ->group("Doppler");
         app.add_option("--baseline", doppler.baseline, "Shift of velocity 0, part of the scale")
             ->check(CLI::Range(-0.9, 0.9))
             ->group("Doppler");
@@ -117,6 +118,7 @@ struct DopplerOptions {
         arguments.gate_given = gate.size() == 3;
         arguments.angle_given = angle->count() > 0;
         arguments.steer_given = steer->count() > 0;
+        arguments.spectral_scale_given = spectral_scale->count() > 0;
         if (arguments.gate_given) {
             doppler.gate_line = gate[0];
             doppler.gate_depth_mm = gate[1];
@@ -126,7 +128,7 @@ struct DopplerOptions {
 
     std::string mode = "b";
     std::vector<double> box, gate;
-    CLI::Option *angle = nullptr, *steer = nullptr;
+    CLI::Option *angle = nullptr, *steer = nullptr, *spectral_scale = nullptr;
 };
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "formats/base/constants.h"
 #include "formats/flow/flow_field.h"
+#include "formats/flow/flow_velocity.h"
 #include "formats/volume/tissue.h"
 #include "runtime/imaging/truth/plane_look_up.h"
 
@@ -20,6 +21,8 @@ using namespace doppler;
 constexpr double kInPlaneMm = 1.5;  // the plane cuts a vessel's node that is this near
 constexpr double kBreathStepS = 0.02;
 constexpr double kAimSteerDeg = 20;  // steering that a machine offers to either side
+// The fastest blood reaches this share of the scale that is aimed for; steps of the console.
+constexpr double kAimFill = 0.75, kScaleStepCmS = 5, kMinScaleCmS = 10, kMaxScaleCmS = 500;
 
 std::vector<std::uint8_t> hard_labels(const CaseBundle& bundle) {
     std::vector<std::uint8_t> hard;
@@ -286,6 +289,7 @@ struct SeenNode {
     double off_mm = 0;
     double radius_mm = 0;
     Vector3 flow;  // unit, frame `probe`
+    const FlowVessel* vessel = nullptr;
 };
 
 SeenNode seen_node(const FlowNode& node,
@@ -314,7 +318,8 @@ SeenNode between(const SeenNode& a, const SeenNode& b, double t) {
     return {{mix(a.at.x, b.at.x), mix(a.at.z, b.at.z)},
             mix(a.off_mm, b.off_mm),
             mix(a.radius_mm, b.radius_mm),
-            normalized(a.flow + t * (b.flow - a.flow))};
+            normalized(a.flow + t * (b.flow - a.flow)),
+            a.vessel};
 }
 
 }  // namespace
@@ -364,7 +369,8 @@ std::optional<DopplerSettings> DopplerView::aim(const FrameInput& input,
                 before.reset();
                 continue;
             }
-            const SeenNode now = seen_node(node, probe_from_mannequin, tissue);
+            SeenNode now = seen_node(node, probe_from_mannequin, tissue);
+            now.vessel = &vessel;
             // Along the plane, or across it between two nodes.
             if (std::abs(now.off_mm) < std::min(kInPlaneMm, 0.5 * now.radius_mm)) consider(now);
             if (before && (before->off_mm < 0) != (now.off_mm < 0))
@@ -398,6 +404,13 @@ std::optional<DopplerSettings> DopplerView::aim(const FrameInput& input,
     const double away = flow.x * beam.x + flow.z * beam.z;
     const double side = (beam.x * flow.z - beam.z * flow.x) * (away > 0 ? 1 : -1);
     settings.angle_deg = std::copysign(std::min(angle, 80.0), side);
+    const VelocityRange velocity =
+        velocity_range(*widest->vessel, kPi * radius * radius, beat_s(m.exercise));
+    const double fastest_cm_s = 0.1 * velocity.peak * (1 + 0.5 * widest->vessel->breathing) *
+                                std::cos(std::min(angle, 80.0) * kPi / 180);
+    settings.spectral_scale_cm_s =
+        std::clamp(kScaleStepCmS * std::ceil(fastest_cm_s / kAimFill / kScaleStepCmS), kMinScaleCmS,
+                   kMaxScaleCmS);
     settings.box_left = std::clamp(settings.gate_line - 0.25, 0.0, 0.5);
     settings.box_right = settings.box_left + 0.5;
     settings.box_top_mm = std::max(settings.gate_depth_mm - 0.25 * m.geometry.depth_mm, 2.0);

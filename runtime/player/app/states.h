@@ -141,8 +141,9 @@ struct Cine {
 struct Console {
     ScanControls controls;
     Cine cine;
-    std::unique_ptr<ClipSaver> clip;  // is being saved; null: none
-    bool doppler_aimed = false;       // box and gate were put somewhere in this exercise
+    std::unique_ptr<ClipSaver> clip;    // is being saved; null: none
+    bool doppler_aimed = false;         // box and gate were put somewhere in this exercise
+    bool keeps_spectral_scale = false;  // it was given: the first aiming leaves it
 };
 
 // Exercises of an exam set that runs; none: none does.
