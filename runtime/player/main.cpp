@@ -226,6 +226,10 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
         ->check(CLI::Range(0.75, 4.0));
     app.add_option("--screenshot", arguments.screenshot, "Save the window's last picture as PNG")
         ->group("Testing");
+    app.add_option("--course", arguments.course,
+                   "A course (course.toml) beside those in the folders of cases")
+        ->type_name("FILE")
+        ->group("Training");
     app.add_option("--script", arguments.script, "Play input events from a file into the window")
         ->group("Testing");
     exit_now = false;

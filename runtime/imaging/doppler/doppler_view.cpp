@@ -289,7 +289,6 @@ struct SeenNode {
     double off_mm = 0;
     double radius_mm = 0;
     Vector3 flow;  // unit, frame `probe`
-    const FlowVessel* vessel = nullptr;
 };
 
 SeenNode seen_node(const FlowNode& node,
@@ -318,8 +317,7 @@ SeenNode between(const SeenNode& a, const SeenNode& b, double t) {
     return {{mix(a.at.x, b.at.x), mix(a.at.z, b.at.z)},
             mix(a.off_mm, b.off_mm),
             mix(a.radius_mm, b.radius_mm),
-            normalized(a.flow + t * (b.flow - a.flow)),
-            a.vessel};
+            normalized(a.flow + t * (b.flow - a.flow))};
 }
 
 }  // namespace
@@ -352,6 +350,7 @@ std::optional<DopplerSettings> DopplerView::aim(const FrameInput& input,
         return false;
     };
     std::optional<SeenNode> widest;
+    const FlowVessel *considered = nullptr, *widest_vessel = nullptr;
     const auto consider = [&](const SeenNode& node) {
         double line = 0, sample = 0;
         if ((widest && node.radius_mm <= widest->radius_mm) ||
@@ -359,9 +358,11 @@ std::optional<DopplerSettings> DopplerView::aim(const FrameInput& input,
             (tissue && tissue->closed(tissue->rest(node.at))))
             return;
         widest = node;
+        widest_vessel = considered;
     };
     constexpr double kFarMm = 40;  // beyond all breathing and pressing
     for (const FlowVessel& vessel : m.bundle->flow.vessels) {
+        considered = &vessel;
         std::optional<SeenNode> before;
         for (int i = 0; i < vessel.nodes; ++i) {
             const FlowNode& node = m.bundle->flow.nodes[vessel.first_node + i];
@@ -369,8 +370,7 @@ std::optional<DopplerSettings> DopplerView::aim(const FrameInput& input,
                 before.reset();
                 continue;
             }
-            SeenNode now = seen_node(node, probe_from_mannequin, tissue);
-            now.vessel = &vessel;
+            const SeenNode now = seen_node(node, probe_from_mannequin, tissue);
             // Along the plane, or across it between two nodes.
             if (std::abs(now.off_mm) < std::min(kInPlaneMm, 0.5 * now.radius_mm)) consider(now);
             if (before && (before->off_mm < 0) != (now.off_mm < 0))
@@ -405,8 +405,8 @@ std::optional<DopplerSettings> DopplerView::aim(const FrameInput& input,
     const double side = (beam.x * flow.z - beam.z * flow.x) * (away > 0 ? 1 : -1);
     settings.angle_deg = std::copysign(std::min(angle, 80.0), side);
     const VelocityRange velocity =
-        velocity_range(*widest->vessel, kPi * radius * radius, beat_s(m.exercise));
-    const double fastest_cm_s = 0.1 * velocity.peak * (1 + 0.5 * widest->vessel->breathing) *
+        velocity_range(*widest_vessel, kPi * radius * radius, beat_s(m.exercise));
+    const double fastest_cm_s = 0.1 * velocity.peak * (1 + 0.5 * widest_vessel->breathing) *
                                 std::cos(std::min(angle, 80.0) * kPi / 180);
     settings.spectral_scale_cm_s =
         std::clamp(kScaleStepCmS * std::ceil(fastest_cm_s / kAimFill / kScaleStepCmS), kMinScaleCmS,

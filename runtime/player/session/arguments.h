@@ -48,6 +48,7 @@ struct PlayerArguments {
     double ui_scale = 0;      // 0: from the settings, else from the monitor
     std::string screenshot;   // window: file for its last picture; empty: none
     std::string script;       // window: input events to play, for tests
+    std::string course;       // window: a course beside those of the folders; empty: none
 };
 
 }  // namespace sonocase::runtime::inline player_session
