@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "formats/scoring/draw_attempt.h"
+#include "runtime/player/app/class_records.h"
 #include "support/temporary_folder.h"
 
 namespace sonocase::runtime {
@@ -110,6 +111,35 @@ TEST(CourseStanding, KnowsAnswersOfThisCourseAlone) {
     const CourseStanding now = course_standing(two_modules(), {}, answers, "2026-03-30");
     EXPECT_EQ(now.modules[0].option, 1);
     EXPECT_EQ(now.modules[1].option, -1);  // asks nothing
+}
+
+TEST(ClassRecords, HoldTheCourseOfEachTraineeAndChecklists) {
+    std::vector<ProgressEntry> entries{attempt("look", "2026-02-26T10:00:00Z", true),
+                                       attempt("look", "2026-02-26T11:00:00Z", true),
+                                       attempt("look", "2026-02-26T12:00:00Z", false)};
+    entries[0].trainee = entries[1].trainee = "Ada";
+    entries[2].trainee = "Bob";
+    entries[0].items = {{"found", true, true}, {"numbed", false, false}};
+    entries[1].items = {{"found", true, true}, {"numbed", false, true}};
+    entries[2].items = {{"found", true, false}, {"numbed", false, false}};
+    const Course course = two_modules();
+    const ClassRecords records = make_class_records(entries, {}, &course, "2026-03-01");
+    EXPECT_EQ(records.course.at("Ada").passed, 1);
+    EXPECT_EQ(records.course.at("Bob").passed, 0);
+    EXPECT_TRUE(make_class_records(entries).course.empty());
+    const auto ada = records.checklist("Ada", {"demo", "look"});
+    ASSERT_EQ(ada.size(), 2u);
+    EXPECT_EQ(ada[1].name, "numbed");
+    EXPECT_EQ(ada[1].ticked, 1);
+    EXPECT_EQ(ada[1].attempts, 2);
+    EXPECT_TRUE(ada[1].last);
+    EXPECT_TRUE(ada[0].critical);
+    const auto all = records.checklist("", {"demo", "look"});
+    EXPECT_EQ(all[0].ticked, 2);
+    EXPECT_EQ(all[0].attempts, 3);
+    EXPECT_FALSE(all[0].last);
+    EXPECT_TRUE(records.checklist("Ada", {"demo", "puncture"}).empty());
+    EXPECT_NE(xapi_json(entries).find("xapi/item/numbed\": true"), std::string::npos);
 }
 
 TEST(Courses, OneThatCannotBeReadIsSaidWithItsLine) {
