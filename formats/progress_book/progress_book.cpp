@@ -16,16 +16,23 @@
 namespace sonocase {
 namespace {
 
-constexpr int kVersion = 3;               // 2: seed; 3: attempts of one second stand side by side
+// 2: seed; 3: attempts of one second stand side by side; 4: exam, checklists, answers
+constexpr int kVersion = 4;
 constexpr int kApplication = 0x534F4E4F;  // "SONO"
 
 constexpr const char* kSessionColumns =
     "(id INTEGER PRIMARY KEY, trainee TEXT NOT NULL, case_name TEXT NOT NULL,"
     " exercise TEXT NOT NULL, started TEXT NOT NULL, recording TEXT NOT NULL, passed INTEGER NOT "
-    "NULL, seed INTEGER NOT NULL DEFAULT 0);";
+    "NULL, seed INTEGER NOT NULL DEFAULT 0, exam INTEGER NOT NULL DEFAULT 0);";
 constexpr const char* kScoreTable =
     "CREATE TABLE score(session INTEGER NOT NULL REFERENCES session(id) ON DELETE CASCADE,"
     " metric TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY(session, metric)) WITHOUT ROWID;";
+constexpr const char* kTablesSince4 =
+    "CREATE TABLE item(session INTEGER NOT NULL REFERENCES session(id) ON DELETE CASCADE,"
+    " place INTEGER NOT NULL, name TEXT NOT NULL, critical INTEGER NOT NULL, ticked INTEGER NOT "
+    "NULL, PRIMARY KEY(session, place)) WITHOUT ROWID;"
+    "CREATE TABLE answer(id INTEGER PRIMARY KEY, trainee TEXT NOT NULL, course TEXT NOT NULL,"
+    " module TEXT NOT NULL, option INTEGER NOT NULL, UNIQUE(trainee, course, module));";
 
 // A prepared statement. Texts are bound to it, never pasted into it.
 class Statement {
@@ -136,7 +143,7 @@ Result<ProgressBook> ProgressBook::open(const std::string& path) {
     if (tables < 0) return impl->fault("is not a progress book");
     if (tables == 0 && version == 0) {
         const std::string make = std::string("BEGIN IMMEDIATE; CREATE TABLE session") +
-                                 kSessionColumns + kScoreTable +
+                                 kSessionColumns + kScoreTable + kTablesSince4 +
                                  "PRAGMA application_id=" + std::to_string(kApplication) +
                                  ";PRAGMA user_version=" + std::to_string(kVersion) + ";COMMIT;";
         if (!impl->run(make.c_str())) {
@@ -159,9 +166,8 @@ Result<ProgressBook> ProgressBook::open(const std::string& path) {
             "INSERT INTO fresh SELECT id, trainee, case_name, exercise, started, recording, "
             "passed," +
             (version < 2 ? " 0" : " seed") +
-            " FROM session; DROP TABLE session; ALTER TABLE fresh RENAME TO session;"
-            "PRAGMA user_version=" +
-            std::to_string(kVersion) + "; COMMIT;";
+            ", 0 FROM session; DROP TABLE session; ALTER TABLE fresh RENAME TO session;" +
+            kTablesSince4 + "PRAGMA user_version=" + std::to_string(kVersion) + "; COMMIT;";
         const bool copied = impl->run(copy.c_str());
         if (!copied) impl->run("ROLLBACK");
         impl->run("PRAGMA foreign_keys=ON");
@@ -191,14 +197,14 @@ Status ProgressBook::add(const ProgressEntry& entry) {
             return give_up();
         Statement row(
             impl.db,
-            "INSERT INTO session(trainee, case_name, exercise, started, recording, passed, seed)"
-            " VALUES(?,?,?,?,?,?,?)");
+            "INSERT INTO session(trainee, case_name, exercise, started, recording, passed, seed, "
+            "exam) VALUES(?,?,?,?,?,?,?,?)");
         row.bind(1, entry.trainee)
             .bind(2, entry.case_name)
             .bind(3, entry.exercise)
             .bind(4, entry.started);
         row.bind(5, entry.recording).bind(6, std::int64_t{entry.passed});
-        row.bind(7, static_cast<std::int64_t>(entry.seed));
+        row.bind(7, static_cast<std::int64_t>(entry.seed)).bind(8, std::int64_t{entry.exam});
         if (row.step() != SQLITE_DONE) return give_up();
         const std::int64_t id = sqlite3_last_insert_rowid(impl.db);
         Statement score(impl.db,
@@ -208,6 +214,15 @@ Status ProgressBook::add(const ProgressEntry& entry) {
             score.reset();
             if (score.bind(1, id).bind(2, metric.name).bind(3, metric.value).step() != SQLITE_DONE)
                 return give_up();
+        }
+        Statement line(
+            impl.db, "INSERT INTO item(session, place, name, critical, ticked) VALUES(?,?,?,?,?)");
+        for (std::size_t i = 0; i < entry.items.size(); ++i) {
+            const CheckedItem& item = entry.items[i];
+            line.reset();
+            line.bind(1, id).bind(2, static_cast<std::int64_t>(i)).bind(3, item.name);
+            line.bind(4, std::int64_t{item.critical}).bind(5, std::int64_t{item.ticked});
+            if (line.step() != SQLITE_DONE) return give_up();
         }
     }
     if (!impl.run("COMMIT")) return give_up();
@@ -219,7 +234,8 @@ Result<std::vector<ProgressEntry>> ProgressBook::sessions(const std::string& tra
     std::vector<ProgressEntry> entries;
     Statement rows(
         impl_->db,
-        "SELECT id, trainee, case_name, exercise, started, recording, passed, seed FROM session"
+        "SELECT id, trainee, case_name, exercise, started, recording, passed, seed, exam FROM "
+        "session"
         " WHERE (?1='' OR trainee=?1) AND (?2='' OR exercise=?2) ORDER BY started, id");
     rows.bind(1, trainee).bind(2, exercise);
     int state = 0;
@@ -233,10 +249,13 @@ Result<std::vector<ProgressEntry>> ProgressBook::sessions(const std::string& tra
         e.recording = rows.text(5);
         e.passed = rows.integer(6) != 0;
         e.seed = static_cast<std::uint64_t>(rows.integer(7));
+        e.exam = rows.integer(8) != 0;
         entries.push_back(std::move(e));
     }
     if (state != SQLITE_DONE) return impl_->fault("cannot read");
     Statement scores(impl_->db, "SELECT metric, value FROM score WHERE session=?");
+    Statement lines(impl_->db,
+                    "SELECT name, critical, ticked FROM item WHERE session=? ORDER BY place");
     for (ProgressEntry& e : entries) {
         scores.reset();
         scores.bind(1, e.id);
@@ -247,8 +266,36 @@ Result<std::vector<ProgressEntry>> ProgressBook::sessions(const std::string& tra
             const auto found = values.find(info.name);
             if (found != values.end()) e.metrics.push_back({info.name, found->second});
         }
+        lines.reset();
+        lines.bind(1, e.id);
+        while ((state = lines.step()) == SQLITE_ROW)
+            e.items.push_back({lines.text(0), lines.integer(1) != 0, lines.integer(2) != 0});
+        if (state != SQLITE_DONE) return impl_->fault("cannot read");
     }
     return entries;
+}
+
+Status ProgressBook::add(const CourseAnswer& answer) {
+    Statement row(impl_->db,
+                  "INSERT OR REPLACE INTO answer(trainee, course, module, option) VALUES(?,?,?,?)");
+    row.bind(1, answer.trainee).bind(2, answer.course).bind(3, answer.module);
+    if (row.bind(4, std::int64_t{answer.option}).step() != SQLITE_DONE)
+        return impl_->fault("cannot store the answer");
+    return Done{};
+}
+
+Result<std::vector<CourseAnswer>> ProgressBook::answers(const std::string& trainee) const {
+    std::vector<CourseAnswer> all;
+    Statement rows(impl_->db,
+                   "SELECT trainee, course, module, option FROM answer WHERE (?1='' OR trainee=?1)"
+                   " ORDER BY id");
+    rows.bind(1, trainee);
+    int state = 0;
+    while ((state = rows.step()) == SQLITE_ROW)
+        all.push_back(
+            {rows.text(0), rows.text(1), rows.text(2), static_cast<int>(rows.integer(3))});
+    if (state != SQLITE_DONE) return impl_->fault("cannot read");
+    return all;
 }
 
 Result<std::vector<std::string>> ProgressBook::trainees() const {
@@ -275,8 +322,11 @@ Status ProgressBook::remove_trainee(const std::string& trainee,
             if (failed && not_deleted) not_deleted->push_back(file);
         }
     }
-    Statement rows(impl_->db, "DELETE FROM session WHERE trainee=?");
-    if (rows.bind(1, trainee).step() != SQLITE_DONE) return impl_->fault("cannot remove");
+    for (const char* sql :
+         {"DELETE FROM session WHERE trainee=?", "DELETE FROM answer WHERE trainee=?"}) {
+        Statement rows(impl_->db, sql);
+        if (rows.bind(1, trainee).step() != SQLITE_DONE) return impl_->fault("cannot remove");
+    }
     return Done{};
 }
 
@@ -302,6 +352,14 @@ Result<std::string> ProgressBook::csv(const std::string& trainee,
     return out;
 }
 
+std::vector<CheckedItem> checked_items(const SessionScore& score) {
+    std::vector<CheckedItem> items;
+    if (!score.procedure) return items;
+    for (const ProcedureResult::Item& item : score.procedure->items)
+        items.push_back({item.name, item.critical, item.ticked});
+    return items;
+}
+
 ProgressEntry progress_entry(const SessionHeader& header,
                              const SessionScore& score,
                              const std::string& recording) {
@@ -313,9 +371,11 @@ ProgressEntry progress_entry(const SessionHeader& header,
     entry.recording = recording;
     entry.passed = score.passed;
     entry.seed = attempt_seed(header);
+    entry.exam = detail_value(header.attempt, "mode") == "exam";
     for (const Metric& metric : score.metrics) {
         if (std::isfinite(metric.value)) entry.metrics.push_back(metric);
     }
+    entry.items = checked_items(score);
     return entry;
 }
 

@@ -17,20 +17,36 @@
 
 namespace sonocase {
 
+// A line of a procedure's checklist as an attempt left it.
+struct CheckedItem {
+    std::string name;
+    bool critical = false, ticked = false;
+    friend bool operator==(const CheckedItem&, const CheckedItem&) = default;
+};
+
 struct ProgressEntry {
     std::int64_t id = 0;                                // given by the book
     std::string trainee, case_name, exercise, started;  // started: ISO 8601, UTC
     std::string recording;                              // path of the session file; empty: not kept
     bool passed = false;
-    std::uint64_t seed = 0;       // with which the attempt was drawn; 0: exercise as written
-    std::vector<Metric> metrics;  // only those with a finite value
+    bool exam = false;               // no help was given
+    std::uint64_t seed = 0;          // with which the attempt was drawn; 0: exercise as written
+    std::vector<Metric> metrics;     // only those with a finite value
+    std::vector<CheckedItem> items;  // of its procedure, in the order of the file
+};
+
+// What a trainee chose when a module of a course asked (formats/exercise/course.h).
+struct CourseAnswer {
+    std::string trainee, course, module;
+    int option = 0;
+    friend bool operator==(const CourseAnswer&, const CourseAnswer&) = default;
 };
 
 class ProgressBook {
   public:
     // Creates the file and its folder if they are missing. A book of an older version is brought to
-    // version 3; sessions of version 1 get the seed 0. An Error for a file that is not a progress
-    // book or was written by a newer program.
+    // version 4; sessions of version 1 get the seed 0, those before 4 count as practice. An Error
+    // for a file that is not a progress book or was written by a newer program.
     static Result<ProgressBook> open(const std::string& path);
     ~ProgressBook();
     ProgressBook(ProgressBook&&) noexcept;
@@ -44,6 +60,10 @@ class ProgressBook {
     Result<std::vector<ProgressEntry>> sessions(const std::string& trainee,
                                                 const std::string& exercise) const;
     Result<std::vector<std::string>> trainees() const;
+    // An answer to the same question replaces the one before.
+    Status add(const CourseAnswer& answer);
+    // In the order in which they were given; an empty name matches all.
+    Result<std::vector<CourseAnswer>> answers(const std::string& trainee) const;
     // Removes the rows and the files of the recordings; `not_deleted` lists files that could not be
     // deleted.
     Status remove_trainee(const std::string& trainee,
@@ -57,6 +77,8 @@ class ProgressBook {
     std::unique_ptr<Impl> impl_;
 };
 
+// The checklist of a score; empty where its exercise has no procedure.
+std::vector<CheckedItem> checked_items(const SessionScore& score);
 ProgressEntry progress_entry(const SessionHeader& header,
                              const SessionScore& score,
                              const std::string& recording);

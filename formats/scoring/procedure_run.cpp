@@ -24,6 +24,7 @@ constexpr double kWireMm = 450, kWireHeldMm = 50;
 constexpr double kShownWireMm = 60;  // drawn beyond the tip, at most
 constexpr double kBleedMlS = 0.2, kMaxBledMl = 60, kStopBleedingS = 30;
 constexpr double kLongestStepS = 1;  // time of acts that last does not run on across a gap
+constexpr double kClosedVein = 0.1;  // share of its area at rest
 constexpr double kBeyondMm = 1;      // deeper than a collection's far side
 constexpr std::size_t kMaxPerformances = 128;
 
@@ -375,8 +376,11 @@ void ProcedureRun::aspirate(double ml, const Facts& f) {
     }
     if (f.depth_mm <= 0) return gives(f.needle_ok ? "air" : "nothing");
     switch (kind_[static_cast<std::size_t>(f.label)]) {
-        case kArtery:
-        case kVein: return gives("blood");
+        case kVein:  // walls that touch let nothing through
+            if (f.has_press && f.vein_open >= 0 && f.vein_open < kClosedVein)
+                return gives("nothing");
+            [[fallthrough]];
+        case kArtery: return gives("blood");
         case kUrine: return gives("urine");
         case kBile: return gives("bile");
         case kLung:

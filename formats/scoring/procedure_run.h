@@ -18,7 +18,8 @@
 //               within 3 mm of a ball goes into it. Nothing goes into bone; in a vessel it is
 //               carried away and named as a complication
 //   aspirate    draws what the tip is in: blood, urine (also of a calyx), bile, pus (an abscess),
-//               fluid (a cyst), air (lung, gas); from a collection it takes the volume away
+//               fluid (a cyst), air (lung, gas); from a collection it takes the volume away. A vein
+//               that the probe closes to a tenth gives nothing
 //   core_throw  takes what lies along the next 15 or 22 mm, looked up every half millimetre, and
 //               the targets without a look of their own that it passes; a vessel in it bleeds
 //   wire        is in once the tip is in the body; withdrawn when all of it is drawn back. All

@@ -196,6 +196,15 @@ Result<ProgressEntry> kept_entry(const std::string& path) {
     for (const auto& [name, value] : scores["metrics"].items()) {
         if (value.is_number()) score.metrics.push_back({name, value.get<double>()});
     }
+    if (scores.contains("procedure") && scores["procedure"].contains("items")) {
+        ProcedureResult& list = score.procedure.emplace();
+        for (const auto& item : scores["procedure"]["items"]) {
+            ProcedureResult::Item& line = list.items.emplace_back();
+            line.name = item.value("name", "");
+            line.critical = item.value("critical", false);
+            line.ticked = item.value("ticked", false);
+        }
+    }
     std::error_code failed;
     const std::string whole = std::filesystem::absolute(recording, failed).string();
     return progress_entry(session.header, score, failed ? recording : whole);

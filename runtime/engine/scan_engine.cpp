@@ -140,6 +140,7 @@ void ScanEngine::observe(const TrackerReading& given, bool is_device) {
     force_watch_.observe(reading.force_n, reading.time_s);
     if (reading.restarts) {
         procedure_.begin();
+        procedure_shift_s_ = 0;
         waiting_act_count_ = 0;
     }
     for (int i = 0; i < std::min(reading.acts.count, ActList::kMaxActs); ++i)
@@ -159,6 +160,13 @@ void ScanEngine::observe(const TrackerReading& given, bool is_device) {
     if (!tools.has_needle || hold_needle)
         tools.mannequin_from_needle = tools_.mannequin_from_needle;
     tools_ = tools;
+}
+
+void ScanEngine::pass_over(std::span<const SessionSample> samples) {
+    if (!procedure_.given()) return;
+    for (const SessionSample& sample : samples) procedure_.update(sample);
+    if (reading_.device_time_s >= 0)
+        procedure_shift_s_ = reading_.device_time_s - (reading_.time_s - origin_s_);
 }
 
 bool ScanEngine::act(const Act& act) {
@@ -238,8 +246,8 @@ FrameStatus ScanEngine::frame(double now_s,
         std::copy(waiting_acts_.begin() + taken, waiting_acts_.begin() + waiting_act_count_,
                   waiting_acts_.begin());
         waiting_act_count_ -= taken;
-        procedure_.update(time_s, tools.has_probe, tools.mannequin_from_probe, tools.has_needle,
-                          record.needle.mannequin_from_drawn, record.press.solved,
+        procedure_.update(time_s + procedure_shift_s_, tools.has_probe, tools.mannequin_from_probe,
+                          tools.has_needle, record.needle.mannequin_from_drawn, record.press.solved,
                           {record.press.force_n, record.press.pressure_kpa, record.press.vein_open},
                           record.acts);
         record.new_steps = procedure_.new_steps();
@@ -261,6 +269,7 @@ void ScanEngine::begin_session(double now_s) {
     needle_ = NeedleState(anatomy_.get(), exercise_.needle);
     puncture_.reset();
     procedure_.begin();
+    procedure_shift_s_ = 0;
     waiting_act_count_ = 0;
 }
 
@@ -269,6 +278,7 @@ void ScanEngine::take_over(const ScanEngine& before) {
     needle_.set_anatomy(anatomy_.get());
     puncture_ = before.puncture_;
     procedure_ = before.procedure_;
+    procedure_shift_s_ = before.procedure_shift_s_;
     waiting_acts_ = before.waiting_acts_;
     waiting_act_count_ = before.waiting_act_count_;
     force_watch_ = before.force_watch_;

@@ -111,6 +111,10 @@ class ScanEngine {
     // the others say, and both are with the reference; so is one at exactly the identity among
     // others, which senders give for none.
     void observe(const TrackerReading& reading, bool is_device);
+    // After a reading that restarts: takes the procedure through the samples that a recording holds
+    // before it, so that state, list and moments are those of playing it. Renders nothing. Cost:
+    // an update of the procedure for each.
+    void pass_over(std::span<const SessionSample> samples);
     // An act of the exercise's procedure, for the next frame; at most four come into one frame, the
     // rest into those after it. False: dozens of them wait already.
     bool act(const Act& act);
@@ -178,6 +182,8 @@ class ScanEngine {
     static constexpr int kMaxWaitingActs = 64;
     std::array<Act, kMaxWaitingActs> waiting_acts_{};
     int waiting_act_count_ = 0;
+    // The procedure's time less the session's: after a jump it is that of the recording.
+    double procedure_shift_s_ = 0;
     double sensed_press_mm_ = 0;  // depth of pressing that the force sensor's last reading asks for
     Exercise exercise_;
     EngineOptions options_;

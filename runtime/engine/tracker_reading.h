@@ -52,7 +52,8 @@ struct TrackerReading {
     int sensor_count = 0;
     std::array<SensorReading, kMaxSensors> sensors{};
     ActList acts;  // of a script, a recording or a pedal, since the reading before
-    // A script or recording starts over or goes back: what its acts did is undone.
+    // A script or recording does not go on from the reading before: what its acts did is undone,
+    // and begins anew with what Tracker::passed_over() gives.
     bool restarts = false;
 };
 

@@ -75,10 +75,11 @@ struct DopplerOptions {
         app.add_option("--scale", doppler.scale_cm_s, "Nyquist velocity of the colour box, cm/s")
             ->check(CLI::Range(1.0, 500.0))
             ->group("Doppler");
-        app.add_option("--spectral-scale", doppler.spectral_scale_cm_s,
-                       "Nyquist velocity of the spectrum, cm/s")
-            ->check(CLI::Range(1.0, 1000.0))
-            ->group("Doppler");
+        spectral_scale = app.add_option("--spectral-scale", doppler.spectral_scale_cm_s,
+                                        "Nyquist velocity of the spectrum, cm/s; default: by the "
+                                        "fastest blood of the vessel aimed at, else 100")
+                             ->check(CLI::Range(1.0, 1000.0))
+                             ->group("Doppler");
         app.add_option("--baseline", doppler.baseline, "Shift of velocity 0, part of the scale")
             ->check(CLI::Range(-0.9, 0.9))
             ->group("Doppler");
@@ -119,6 +120,7 @@ struct DopplerOptions {
         arguments.gate_given = gate.size() == 3;
         arguments.angle_given = angle->count() > 0;
         arguments.steer_given = steer->count() > 0;
+        arguments.spectral_scale_given = spectral_scale->count() > 0;
         if (arguments.gate_given) {
             doppler.gate_line = gate[0];
             doppler.gate_depth_mm = gate[1];
@@ -128,7 +130,7 @@ struct DopplerOptions {
 
     std::string mode = "b";
     std::vector<double> box, gate;
-    CLI::Option *angle = nullptr, *steer = nullptr;
+    CLI::Option *angle = nullptr, *steer = nullptr, *spectral_scale = nullptr;
 };
 
 int wrong_usage(const CLI::App& app, const std::string& what, int argc, char** argv) {
@@ -241,6 +243,10 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
         ->check(CLI::Range(0.75, 4.0));
     app.add_option("--screenshot", arguments.screenshot, "Save the window's last picture as PNG")
         ->group("Testing");
+    app.add_option("--course", arguments.course,
+                   "A course (course.toml) beside those in the folders of cases")
+        ->type_name("FILE")
+        ->group("Training");
     app.add_option("--script", arguments.script, "Play input events from a file into the window")
         ->group("Testing");
     exit_now = false;

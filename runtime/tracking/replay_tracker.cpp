@@ -178,14 +178,16 @@ bool ReplayTracker::poll(double now_s, TrackerReading& reading) {
     reading.placed = true;
     reading.sensor_count = recording_.needle.empty() ? 1 : 2;
     const double until_s = probe[i].timestamp_s + 5e-7;
+    passed_ = 0;
     if ((back || forward) && !recording_.acts.empty()) {
-        reading.restarts = back;
-        // Those of the time that is skipped are not made up for; without their poses they would
-        // do something else.
-        if (back) acted_ = 0;
-        while (acted_ < recording_.acts.size() &&
-               recording_.acts[acted_].time_s < probe[i].timestamp_s - 5e-7)
-            ++acted_;
+        // Acts of the time that is skipped would do something else without their poses: they come
+        // with the samples passed over.
+        const double from_s = probe[i].timestamp_s - 5e-7;
+        reading.restarts = back || !recording_.samples.empty();
+        acted_ = 0;
+        while (acted_ < recording_.acts.size() && recording_.acts[acted_].time_s < from_s) ++acted_;
+        const auto& samples = recording_.samples;
+        while (passed_ < samples.size() && samples[passed_].time_s < from_s) ++passed_;
     }
     while (acted_ < recording_.acts.size() && recording_.acts[acted_].time_s <= until_s) {
         const ActList& acts = recording_.acts[acted_].acts;
@@ -206,6 +208,10 @@ bool ReplayTracker::poll(double now_s, TrackerReading& reading) {
         }
     }
     return true;
+}
+
+std::span<const SessionSample> ReplayTracker::passed_over() const {
+    return std::span(recording_.samples).first(passed_);
 }
 
 TrackerHealth ReplayTracker::health() const {
@@ -286,6 +292,10 @@ Result<Recording> load_recording(const std::string& files,
                 recording.acts.push_back({frame.timestamp_s, acts_of(field.value)});
     std::stable_sort(recording.acts.begin(), recording.acts.end(),
                      [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
+    if (!recording.acts.empty()) {
+        if (auto session = session_from_sequence(sequence, guess_names(sequence), files))
+            recording.samples = std::move(session->samples);
+    }
     const std::size_t readings = recording.probe.size() + recording.needle.size();
     const std::size_t dropped = drop_falling(recording.probe) + drop_falling(recording.needle);
     if (recording.probe.empty()) return Error{"holds no time that is a number", files, ""};

@@ -25,7 +25,10 @@ struct Recording {
         ActList acts;
     };
     std::vector<TimedActs> acts;  // of a procedure, in order of time
-    Message note;                 // what was left out, for the user; empty: nothing
+    // All samples, where there are acts: what a jump passes over. Empty: the recording cannot be
+    // read as a session, and a jump then leaves the skipped acts out.
+    std::vector<SessionSample> samples;
+    Message note;  // what was left out, for the user; empty: nothing
 };
 
 class ReplayTracker final : public Tracker {
@@ -37,6 +40,7 @@ class ReplayTracker final : public Tracker {
     int recorded_readings() const override { return static_cast<int>(recording_.probe.size()); }
     double recorded_time_s(int i) const override;
     double next_s() const override { return next_s_; }
+    std::span<const SessionSample> passed_over() const override;
 
   private:
     Recording recording_;
@@ -47,7 +51,8 @@ class ReplayTracker final : public Tracker {
     double start_s_ = 0, next_s_ = -1;
     std::uint64_t laps_ = 0;
     std::size_t last_ = ~std::size_t{0};
-    std::size_t acted_ = 0;  // acts that have been handed on
+    std::size_t acted_ = 0;   // acts that have been handed on
+    std::size_t passed_ = 0;  // samples before the last reading, where it restarts; else 0
     std::uint64_t sequence_ = 0, not_ok_ = 0;
     bool over_ = false;
 };
@@ -83,6 +88,7 @@ class PacedTracker final : public Tracker {
     int recorded_readings() const override { return inner_->recorded_readings(); }
     double recorded_time_s(int i) const override { return inner_->recorded_time_s(i); }
     double next_s() const override;
+    std::span<const SessionSample> passed_over() const override { return inner_->passed_over(); }
 
   private:
     std::unique_ptr<Tracker> inner_;

@@ -6,12 +6,14 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "formats/base/mailbox.h"
 #include "formats/base/message.h"
+#include "formats/recording/session.h"
 #include "runtime/engine/tracker_reading.h"
 
 namespace sonocase::runtime::inline tracking {
@@ -61,6 +63,9 @@ class Tracker {
     // When the next reading of a recording is due after a poll, on the session's clock; negative:
     // not known.
     virtual double next_s() const { return -1; }
+    // Where the last reading `restarts`: what a recording with acts holds before it, from its
+    // beginning, so that a jump leads to the same state as playing. Valid until the next poll.
+    virtual std::span<const SessionSample> passed_over() const { return {}; }
     // True for hardware and networks. Their readings are noisy, so that a pose that stays equal to
     // the last bit means a frozen sensor.
     virtual bool is_device() const { return false; }

@@ -175,7 +175,8 @@ TEST(HonestExercises, TheExpertPassesTheCentralLineInThePlayerAndTheNeckIsChecke
     const testing::TemporaryFolder folder;
     const std::string path = cooked(
         folder, std::string(SONOCASE_SOURCE) + "/scenarios/neck --set resample.voxel_mm=1.5");
-    testing::expect_expert_ticks_all(path, "central-line");
+    for (const char* exercise : {"central-line", "jugular-across"})
+        testing::expect_expert_ticks_all(path, exercise);
     const auto check = testing::run_command(std::string(SONOCASE_BIN) + "/sonocase check " + path +
                                             " -o " + (folder / "check.html"));
     EXPECT_EQ(check.status, 0) << check.out << check.error;

@@ -160,7 +160,7 @@ TEST_F(KeptScores, BesideABookThatLostItsEnd) {
 TEST_F(KeptScores, BesideABookOfANewerProgram) {
     fill_book(1);
     tell(book_, "PRAGMA user_version=99");
-    expect_kept_and_added("newer", [&] { tell(book_, "PRAGMA user_version=3"); });
+    expect_kept_and_added("newer", [&] { tell(book_, "PRAGMA user_version=4"); });
 }
 
 TEST_F(KeptScores, WhereAFolderStandsInTheBooksPlace) {

@@ -9,6 +9,7 @@
 
 #include "formats/base/constants.h"
 #include "formats/flow/flow_field.h"
+#include "formats/flow/flow_velocity.h"
 #include "formats/volume/tissue.h"
 #include "runtime/imaging/truth/plane_look_up.h"
 
@@ -20,6 +21,8 @@ using namespace doppler;
 constexpr double kInPlaneMm = 1.5;  // the plane cuts a vessel's node that is this near
 constexpr double kBreathStepS = 0.02;
 constexpr double kAimSteerDeg = 20;  // steering that a machine offers to either side
+// The fastest blood reaches this share of the scale that is aimed for; steps of the console.
+constexpr double kAimFill = 0.75, kScaleStepCmS = 5, kMinScaleCmS = 10, kMaxScaleCmS = 500;
 
 std::vector<std::uint8_t> hard_labels(const CaseBundle& bundle) {
     std::vector<std::uint8_t> hard;
@@ -347,6 +350,7 @@ std::optional<DopplerSettings> DopplerView::aim(const FrameInput& input,
         return false;
     };
     std::optional<SeenNode> widest;
+    const FlowVessel *considered = nullptr, *widest_vessel = nullptr;
     const auto consider = [&](const SeenNode& node) {
         double line = 0, sample = 0;
         if ((widest && node.radius_mm <= widest->radius_mm) ||
@@ -354,9 +358,11 @@ std::optional<DopplerSettings> DopplerView::aim(const FrameInput& input,
             (tissue && tissue->closed(tissue->rest(node.at))))
             return;
         widest = node;
+        widest_vessel = considered;
     };
     constexpr double kFarMm = 40;  // beyond all breathing and pressing
     for (const FlowVessel& vessel : m.bundle->flow.vessels) {
+        considered = &vessel;
         std::optional<SeenNode> before;
         for (int i = 0; i < vessel.nodes; ++i) {
             const FlowNode& node = m.bundle->flow.nodes[vessel.first_node + i];
@@ -398,6 +404,13 @@ std::optional<DopplerSettings> DopplerView::aim(const FrameInput& input,
     const double away = flow.x * beam.x + flow.z * beam.z;
     const double side = (beam.x * flow.z - beam.z * flow.x) * (away > 0 ? 1 : -1);
     settings.angle_deg = std::copysign(std::min(angle, 80.0), side);
+    const VelocityRange velocity =
+        velocity_range(*widest_vessel, kPi * radius * radius, beat_s(m.exercise));
+    const double fastest_cm_s = 0.1 * velocity.peak * (1 + 0.5 * widest_vessel->breathing) *
+                                std::cos(std::min(angle, 80.0) * kPi / 180);
+    settings.spectral_scale_cm_s =
+        std::clamp(kScaleStepCmS * std::ceil(fastest_cm_s / kAimFill / kScaleStepCmS), kMinScaleCmS,
+                   kMaxScaleCmS);
     settings.box_left = std::clamp(settings.gate_line - 0.25, 0.0, 0.5);
     settings.box_right = settings.box_left + 0.5;
     settings.box_top_mm = std::max(settings.gate_depth_mm - 0.25 * m.geometry.depth_mm, 2.0);

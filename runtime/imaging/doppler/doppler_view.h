@@ -60,7 +60,8 @@ class DopplerView {
     DopplerReport report() const;
 
     // Settings with the gate across the widest open vessel that the plane cuts inside the sector,
-    // the cursor at the true angle, and a box around it; nothing where the plane cuts none.
+    // the cursor at the true angle, a box around it, and the spectrum's scale so that the fastest
+    // blood of a beat fills three quarters of it; nothing where the plane cuts none.
     // steers   a linear probe's lines are steered to either side where that lessens the angle
     // shown    the renderer whose last frame was of `input`: vessels are then taken where breathing
     //          and pressing put them, and none behind bone or gas; null: at rest

@@ -158,8 +158,14 @@ Standing standing(std::span<const ProgressEntry> entries,
             ++result.in_a_row;
             result.cusum += std::log((1 - kSkilled) / (1 - kUnskilled));
         }
-        result.steady = result.steady || result.cusum >= kSteadyCusum;
-        result.mastered = result.mastered || result.in_a_row >= std::max(mastery, 1);
+        if (!result.steady && result.cusum >= kSteadyCusum) {
+            result.steady = true;
+            result.steady_at = entry.started;
+        }
+        if (!result.mastered && result.in_a_row >= std::max(mastery, 1)) {
+            result.mastered = true;
+            result.mastered_at = entry.started;
+        }
         const double mm = metric_of(entry, "final_tip_to_target_mm");
         if (std::isfinite(mm) && (result.best_mm < 0 || mm < result.best_mm)) result.best_mm = mm;
     }

@@ -62,6 +62,7 @@ struct Standing {
     // within 20 attempts, of those who fail 1 in 10, 89 %.
     double cusum = 0;
     bool steady = false;
+    std::string mastered_at, steady_at;  // start of the attempt that made it so
     double best_mm = -1;  // final_tip_to_target_mm of the best attempt; negative: none
 };
 Standing standing(std::span<const ProgressEntry> entries,

@@ -240,6 +240,18 @@ bool start_replay(PlayerState& player, CaseState& loaded, ScanState& scan) {
     return true;
 }
 
+bool watch_expert(PlayerState& player,
+                  CaseState& loaded,
+                  ScanState& scan,
+                  const std::string& sweep) {
+    if (scan.training.attempt || scan.replay.runs()) return false;
+    scan.replay.tracker_before = scan.tracker.spec;
+    choose_tracker(player, loaded, scan.tracker, "sweep:" + sweep);
+    if (scan.tracker.paced) return true;
+    choose_tracker(player, loaded, scan.tracker, std::exchange(scan.replay.tracker_before, {}));
+    return false;
+}
+
 void end_replay(PlayerState& player, CaseState& loaded, ScanState& scan) {
     if (!scan.replay.runs()) return;
     if (scan.replay.recorded) {
@@ -338,6 +350,7 @@ void sign_in(PlayerState& player, const std::string& name) {
     player.progress.trainee = name;
     player.settings.trainee = name;
     player.progress.history.clear();
+    player.progress.answers.clear();
     std::error_code ignored;
     if (!std::filesystem::exists(default_progress_path(), ignored)) return;
     auto book = ProgressBook::open(default_progress_path());
@@ -353,6 +366,27 @@ void sign_in(PlayerState& player, const std::string& name) {
         return;
     }
     player.progress.history = std::move(*sessions);
+    auto answers = book->answers(name);
+    if (!answers) {
+        player.notices.warning(answers.error().message());
+        return;
+    }
+    player.progress.answers = std::move(*answers);
+}
+
+void answer_course(PlayerState& player, const std::string& module, int option) {
+    Progress& progress = player.progress;
+    const CourseAnswer answer{progress.trainee, progress.courses[progress.course].name, module,
+                              option};
+    std::erase_if(progress.answers, [&](const CourseAnswer& other) {
+        return other.course == answer.course && other.module == answer.module;
+    });
+    progress.answers.push_back(answer);
+    progress.class_records.reset();
+    if (answer.trainee.empty()) return;
+    auto book = ProgressBook::open(default_progress_path());
+    const Status kept = book ? book->add(answer) : Status(book.error());
+    if (!kept) player.notices.warning(kept.error().message());
 }
 
 void note_attempt(Progress& progress,
@@ -379,6 +413,8 @@ void note_attempt(Progress& progress,
     entry.recording = training.score_file;
     entry.passed = score.passed;
     entry.seed = loaded.attempt_seed;
+    entry.exam = training.exam;
+    entry.items = checked_items(score);
     for (const Metric& metric : score.metrics) {
         if (std::isfinite(metric.value)) entry.metrics.push_back(metric);
     }

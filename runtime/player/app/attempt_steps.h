@@ -39,6 +39,12 @@ bool may_leave_attempt(PlayerState& player, Training& training, const std::strin
 // whether one begins.
 bool start_replay(PlayerState& player, CaseState& loaded, ScanState& scan);
 void end_replay(PlayerState& player, CaseState& loaded, ScanState& scan);
+// Plays a script of the exercise as a replay. False: an attempt or a replay runs, or there is no
+// such script; a notice says so.
+bool watch_expert(PlayerState& player,
+                  CaseState& loaded,
+                  ScanState& scan,
+                  const std::string& sweep);
 // Makes the review page of the last attempt and opens it. Needs the program sonocase.
 void open_review(Notices& notices, const CaseState& loaded, const Training& training);
 // Practice: the exercise's next hint; after the last of them the targets are shown.
@@ -75,6 +81,9 @@ void mark_targets_reached(const Exercise& exercise,
 // Signs in under a chosen name; empty: nobody, and scores are not kept. Reads that trainee's
 // history. A book that cannot be read becomes a notice.
 void sign_in(PlayerState& player, const std::string& name);
+// Keeps what was chosen before a module of the course in use; for a trainee with a name in the
+// book.
+void answer_course(PlayerState& player, const std::string& module, int option);
 // Works out the page after the attempt that was just scored, and adds the attempt to the history.
 // started: ISO 8601, UTC.
 void note_attempt(Progress& progress,

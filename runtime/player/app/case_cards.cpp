@@ -42,6 +42,19 @@ bool looks_like_a_bundle(const fs::path& path) {
 
 }  // namespace
 
+std::vector<fs::path> case_folders() {
+    std::vector<fs::path> folders;
+    if (!data_folder().empty()) folders.push_back(data_folder() + "/cases");
+    std::stringstream system(std::getenv("XDG_DATA_DIRS") ? std::getenv("XDG_DATA_DIRS")
+                                                          : "/usr/local/share:/usr/share");
+    for (std::string root; std::getline(system, root, ':');) {
+        if (!root.empty()) folders.push_back(root + "/sonocase/cases");
+    }
+    folders.push_back(fs::path("."));
+    folders.push_back(fs::path("out"));
+    return folders;
+}
+
 std::vector<BundleEntry> find_bundles(const std::vector<std::string>& recent) {
     std::vector<BundleEntry> entries;
     std::set<std::string> seen;
@@ -60,16 +73,7 @@ std::vector<BundleEntry> find_bundles(const std::vector<std::string>& recent) {
         entries.push_back(entry);
     };
     for (const std::string& path : recent) add(path, true);
-    std::vector<fs::path> folders;
-    if (!data_folder().empty()) folders.push_back(data_folder() + "/cases");
-    std::stringstream system(std::getenv("XDG_DATA_DIRS") ? std::getenv("XDG_DATA_DIRS")
-                                                          : "/usr/local/share:/usr/share");
-    for (std::string root; std::getline(system, root, ':');) {
-        if (!root.empty()) folders.push_back(root + "/sonocase/cases");
-    }
-    folders.push_back(fs::path("."));
-    folders.push_back(fs::path("out"));
-    for (const fs::path& folder : folders) {
+    for (const fs::path& folder : case_folders()) {
         std::error_code failed;
         std::vector<fs::path> found;
         for (fs::directory_iterator it(folder, failed), end; !failed && it != end;
@@ -146,10 +150,23 @@ void draw_picture(const OpenCase& open, CaseCard& card) {
 
 }  // namespace
 
+namespace {
+
+template <class Named>
+const std::string& title_in_use(const Named& named) {
+    for (std::size_t i = 0; i < std::min(named.titles.size(), languages().size()); ++i)
+        if (&languages()[i] == &language_in_use()) return named.titles[i];
+    return named.titles.empty() ? named.name : named.titles[0];
+}
+
+}  // namespace
+
 const std::string& title_of(const CaseCard::Exercise& exercise) {
-    for (std::size_t i = 0; i < std::min(exercise.titles.size(), languages().size()); ++i)
-        if (&languages()[i] == &language_in_use()) return exercise.titles[i];
-    return exercise.titles.empty() ? exercise.name : exercise.titles[0];
+    return title_in_use(exercise);
+}
+
+const std::string& title_of(const CaseCard::Exercise::Item& item) {
+    return title_in_use(item);
 }
 
 CaseCard make_case_card(const std::string& path) {
@@ -164,11 +181,18 @@ CaseCard make_case_card(const std::string& path) {
     card.title = case_title((*open)->bundle->manifest);
     for (std::size_t i = 0; i < (*open)->exercises.size(); ++i) {
         const Exercise& exercise = (*open)->exercises[i];
-        std::vector<std::string> titles;
-        for (const Language& language : languages())
-            titles.push_back(texts_of(**open, static_cast<int>(i), language.code).title);
-        card.exercises.push_back(
-            {exercise.name, std::move(titles), exercise.mastery, exercise.difficulty});
+        CaseCard::Exercise& shown = card.exercises.emplace_back();
+        shown.name = exercise.name;
+        shown.mastery = exercise.mastery;
+        shown.difficulty = exercise.difficulty;
+        for (const ProcedureItem& item : exercise.procedure.items)
+            shown.items.push_back({item.name, {}});
+        for (const Language& language : languages()) {
+            const ExerciseTexts texts = texts_of(**open, static_cast<int>(i), language.code);
+            shown.titles.push_back(texts.title);
+            for (std::size_t at = 0; at < shown.items.size(); ++at)
+                shown.items[at].titles.push_back(texts.items[at].title);
+        }
     }
     draw_picture(**open, card);
     return card;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -20,8 +21,12 @@ struct BundleEntry {
     bool recent = false;
 };
 
-// Those of `recent` that exist come first (bundles opened before, newest first), then those in the
-// data folders of the user and the system, in the current folder and in its out/.
+// Where cases are looked for: the data folders of the user and the system, the current folder and
+// its out/.
+std::vector<std::filesystem::path> case_folders();
+
+// Those of `recent` that exist come first (bundles opened before, newest first), then those in
+// case_folders().
 std::vector<BundleEntry> find_bundles(const std::vector<std::string>& recent);
 
 // Moves `path` to the front of `recent`, as an absolute path; at most kMaxRecent are kept.
@@ -37,6 +42,11 @@ struct CaseCard {
         std::vector<std::string> titles;  // # languages(), in the window's languages
         int mastery = 3;
         int difficulty = 1;
+        struct Item {
+            std::string name;
+            std::vector<std::string> titles;  // as above
+        };
+        std::vector<Item> items;  // of its checklist
     };
     std::string path;
     std::string case_name;
@@ -68,6 +78,7 @@ class CaseCards {
 
 // In the language in use.
 const std::string& title_of(const CaseCard::Exercise& exercise);
+const std::string& title_of(const CaseCard::Exercise::Item& item);
 
 // Opens a case and makes its card. Cost: opening it, and one picture.
 CaseCard make_case_card(const std::string& path);

@@ -146,6 +146,7 @@ void choose_exercise(PlayerState& player, CaseState& loaded, ScanState& scan, in
     ++loaded.exercise_number;
     scan.console.controls.settings.doppler = player.arguments.doppler;
     scan.console.doppler_aimed = player.arguments.box_given || player.arguments.gate_given;
+    scan.console.keeps_spectral_scale = player.arguments.spectral_scale_given;
     loaded.view3d->set_exercise(exercise);
     loaded.scan->set_tracker(nullptr);
     rebuild_engine(player, loaded, scan.console, false);
@@ -201,7 +202,9 @@ void choose_mode(Notices& notices, CaseState& loaded, Console& console, DopplerM
         notices.warning(
             "This case says nothing about the flow of blood, so that Doppler modes show none.");
     if (!console.doppler_aimed) {
+        const double scale_cm_s = doppler.spectral_scale_cm_s;
         doppler = aimed.value_or(doppler);
+        if (console.keeps_spectral_scale) doppler.spectral_scale_cm_s = scale_cm_s;
         console.doppler_aimed = true;
     }
     loaded.scan->set_doppler(std::move(made));

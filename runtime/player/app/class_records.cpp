@@ -144,8 +144,34 @@ std::vector<double> ClassRecords::curve(const std::string& trainee,
     return all;
 }
 
+std::vector<ChecklistRow> ClassRecords::checklist(const std::string& trainee,
+                                                  const ClassExercise& exercise) const {
+    const auto counts = [&](const ProgressEntry& entry) {
+        return entry.exercise == exercise.name && entry.case_name == exercise.case_name &&
+               !entry.items.empty() && (trainee.empty() || entry.trainee == trainee);
+    };
+    std::vector<ChecklistRow> rows;
+    const auto last = std::find_if(entries.rbegin(), entries.rend(), counts);
+    if (last == entries.rend()) return rows;
+    for (const CheckedItem& item : last->items)
+        rows.push_back({item.name, item.critical, 0, 0, item.ticked});
+    for (const ProgressEntry& entry : entries) {
+        if (!counts(entry)) continue;
+        for (const CheckedItem& item : entry.items) {
+            for (ChecklistRow& row : rows) {
+                if (row.name != item.name) continue;
+                ++row.attempts;
+                row.ticked += item.ticked;
+            }
+        }
+    }
+    return rows;
+}
+
 ClassRecords make_class_records(std::vector<ProgressEntry> entries,
-                                const std::set<std::string>& experts) {
+                                const std::set<std::string>& experts,
+                                const Course* course,
+                                const std::string& today) {
     ClassRecords records;
     records.entries = std::move(entries);
     std::set<std::string> trainees;
@@ -156,6 +182,13 @@ ClassRecords make_class_records(std::vector<ProgressEntry> entries,
     }
     records.trainees.assign(trainees.begin(), trainees.end());
     records.exercises.assign(exercises.begin(), exercises.end());
+    for (const std::string& trainee : records.trainees) {
+        if (!course) break;
+        std::vector<ProgressEntry> own;
+        for (const ProgressEntry& entry : records.entries)
+            if (entry.trainee == trainee) own.push_back(entry);
+        records.course[trainee] = course_standing(*course, own, {}, today);
+    }
     for (const ClassExercise& exercise : records.exercises)
         records.reliability[exercise] = exercise_reliability(records.entries, exercise, experts);
     for (const std::string& trainee : records.trainees) {
@@ -176,6 +209,8 @@ std::string xapi_json(std::span<const ProgressEntry> entries) {
         json extensions = json::object();
         for (const Metric& metric : entry.metrics)
             extensions["https://sonocase.org/xapi/measure/" + metric.name] = metric.value;
+        for (const CheckedItem& item : entry.items)
+            extensions["https://sonocase.org/xapi/item/" + item.name] = item.ticked;
         all.push_back(
             {{"actor",
               {{"objectType", "Agent"},

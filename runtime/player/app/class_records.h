@@ -22,6 +22,7 @@
 
 #include "formats/progress_book/progress_book.h"
 #include "runtime/player/app/attempt_result.h"
+#include "runtime/player/app/course_progress.h"
 
 namespace sonocase::runtime::inline player_app {
 
@@ -70,21 +71,37 @@ struct NeedsHelp {
     int attempts = 0;
 };
 
+// A line of an exercise's checklist over several attempts.
+struct ChecklistRow {
+    std::string name;
+    bool critical = false;
+    int ticked = 0, attempts = 0;
+    bool last = false;  // ticked in the last of them
+};
+
 struct ClassRecords {
     std::vector<ProgressEntry> entries;    // oldest first
     std::vector<std::string> trainees;     // those that occur, sorted
     std::vector<ClassExercise> exercises;  // likewise
     std::map<ClassExercise, ExerciseReliability> reliability;
     NeedsHelp help;
+    std::map<std::string, CourseStanding> course;  // of each trainee; empty: there is no course
 
     Standing standing(const std::string& trainee, const ClassExercise& exercise) const;
+    // By the list of the last attempt, in its order; empty: the exercise has no list. trainee
+    // empty: of everyone.
+    std::vector<ChecklistRow> checklist(const std::string& trainee,
+                                        const ClassExercise& exercise) const;
     // Tip to target, mm, of each attempt that has it, oldest first.
     std::vector<double> curve(const std::string& trainee, const ClassExercise& exercise) const;
 };
 
 // experts: trainees whom the educator calls so.
+// course: whose standings are wanted, on the day `today`; null: none.
 ClassRecords make_class_records(std::vector<ProgressEntry> entries,
-                                const std::set<std::string>& experts = {});
+                                const std::set<std::string>& experts = {},
+                                const Course* course = nullptr,
+                                const std::string& today = "");
 
 // Statements of the Experience API 1.0.3, one per attempt, as a JSON array. Trainees are accounts
 // of this machine, not mail addresses.

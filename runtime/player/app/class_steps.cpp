@@ -8,6 +8,7 @@
 #include "formats/files/atomic_file.h"
 #include "runtime/player/app/attempt_steps.h"
 #include "runtime/player/app/settings.h"
+#include "runtime/player/session/clock.h"
 
 namespace sonocase::runtime::inline player_app {
 
@@ -23,8 +24,10 @@ const ClassRecords& class_records(PlayerState& player) {
         player.notices.error(entries.error().message());
         return *kept;
     }
-    kept = make_class_records(std::move(*entries),
-                              {player.settings.experts.begin(), player.settings.experts.end()});
+    const Progress& progress = player.progress;
+    kept = make_class_records(
+        std::move(*entries), {player.settings.experts.begin(), player.settings.experts.end()},
+        progress.courses.empty() ? nullptr : &progress.courses[progress.course], utc_now());
     return *kept;
 }
 

@@ -210,6 +210,10 @@ bool ScanThread::poll_tracker(double now_s) {
         waiting_ = false;
         reading_ = reading;
         engine_->observe(reading_, tracker_->is_device());
+        if (reading_.restarts) engine_->pass_over(tracker_->passed_over());
+        // Another engine is given this reading again, not what was done with it.
+        reading_.restarts = false;
+        reading_.acts = {};
     }
     return arrived;
 }

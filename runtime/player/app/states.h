@@ -32,6 +32,7 @@
 #include "runtime/player/app/case_cards.h"
 #include "runtime/player/app/class_records.h"
 #include "runtime/player/app/clip_saver.h"
+#include "runtime/player/app/course_progress.h"
 #include "runtime/player/app/guided_start.h"
 #include "runtime/player/app/notices.h"
 #include "runtime/player/app/picture_marks.h"
@@ -59,6 +60,9 @@ struct Progress {
     // since the program started.
     std::vector<ProgressEntry> history;
     std::vector<std::string> trainees;          // known by the progress book
+    std::vector<Course> courses;                // of the folders of cases
+    std::size_t course = 0;                     // of them, the one that is shown
+    std::vector<CourseAnswer> answers;          // likewise of that trainee
     std::optional<ClassRecords> class_records;  // of everyone; null: to be read
 };
 
@@ -141,8 +145,9 @@ struct Cine {
 struct Console {
     ScanControls controls;
     Cine cine;
-    std::unique_ptr<ClipSaver> clip;  // is being saved; null: none
-    bool doppler_aimed = false;       // box and gate were put somewhere in this exercise
+    std::unique_ptr<ClipSaver> clip;    // is being saved; null: none
+    bool doppler_aimed = false;         // box and gate were put somewhere in this exercise
+    bool keeps_spectral_scale = false;  // it was given: the first aiming leaves it
 };
 
 // Exercises of an exam set that runs; none: none does.
@@ -247,7 +252,7 @@ struct Display {
     InstructorView instructor;
 };
 
-enum class Page { bundles, scan, after, group };
+enum class Page { bundles, scan, after, group, course };
 
 // What is open over the page; one at a time.
 enum class Dialog {
@@ -280,6 +285,14 @@ struct Screen {
     bool swapped = false;  // the 3-D view is in the picture's place
     int put_off = -1;      // a procedure's questions up to this item wait
     AfterPage after;
+    bool in_course = false;  // the exercise was opened for the course: the way back leads there
+};
+
+// The page of a course.
+struct CoursePage {
+    int module = -1;         // shown; -1: the next one
+    double scroll = 0;       // of the module, u
+    double scroll_list = 0;  // of the modules, u
 };
 
 // What the user puts on the picture, and what the mouse does there.
@@ -342,6 +355,7 @@ struct ViewState {
     HoverNames hover;
     BundleChooser chooser;
     ClassPage class_page;
+    CoursePage course_page;
     Educator educator;
     char sign_in_name[64] = "";  // typed
 };

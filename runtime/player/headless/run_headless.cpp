@@ -50,7 +50,7 @@ class DopplerRun {
     // Box, and gate with its cursor, in the widest vessel of the plane; lines are steered towards
     // its flow.
     struct Aim {
-        bool box = true, gate = true, cursor = true, steering = true;
+        bool box = true, gate = true, cursor = true, steering = true, scale = true;
     };
     void aim(const Rigid& mannequin_from_probe, Aim what, DopplerSettings& settings) const;
     // What the recording keeps of the last frame.
@@ -146,6 +146,7 @@ void DopplerRun::aim(const Rigid& mannequin_from_probe, Aim what, DopplerSetting
         settings.gate_mm = aimed.gate_mm;
     }
     if (what.gate && what.cursor) settings.angle_deg = aimed.angle_deg;
+    if (what.gate && what.scale) settings.spectral_scale_cm_s = aimed.spectral_scale_cm_s;
 }
 
 void DopplerRun::frame(const ScanEngine& engine, std::span<const std::uint8_t> pixels) {
@@ -464,6 +465,7 @@ Status HeadlessRun::take_pose(int i, double& now_s) {
     }
     say_health();
     if (fresh) engine_->observe(reading_, device);
+    if (fresh && reading_.restarts) engine_->pass_over(tracker_->passed_over());
     if (i == 0 && device) {
         for (const std::string& warning :
              sensor_mismatch_warnings(calibrations_, tracker_->health().device))
@@ -484,7 +486,7 @@ Status HeadlessRun::render(int i, double now_s) {
         if (!replay_)
             doppler_->aim(tool_poses(reading_, calibrations_, assignment_).mannequin_from_probe,
                           {!arguments_.box_given, !arguments_.gate_given, !arguments_.angle_given,
-                           !arguments_.steer_given},
+                           !arguments_.steer_given, !arguments_.spectral_scale_given},
                           settings_.doppler);
     }
     const double before_s = steady_seconds();

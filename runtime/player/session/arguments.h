@@ -34,8 +34,9 @@ struct PlayerArguments {
     DopplerSettings doppler;           // mode and controls that the run begins with
     // False: box and gate go to the widest vessel of the first frame, along its flow.
     bool box_given = false, gate_given = false, angle_given = false, steer_given = false;
-    std::string sound;     // WAV of the spectral mode; empty: none
-    double press_mm = -1;  // that the probe is pressed in; negative: the exercise's
+    bool spectral_scale_given = false;  // false: from the vessel aimed at
+    std::string sound;                  // WAV of the spectral mode; empty: none
+    double press_mm = -1;               // that the probe is pressed in; negative: the exercise's
     int threads = 1;
     int scanlines = 0, samples = 0;         // 0: the model's own
     int looks = 0;                          // 0: the machine's
@@ -48,6 +49,7 @@ struct PlayerArguments {
     double ui_scale = 0;      // 0: from the settings, else from the monitor
     std::string screenshot;   // window: file for its last picture; empty: none
     std::string script;       // window: input events to play, for tests
+    std::string course;       // window: a course beside those of the folders; empty: none
 };
 
 }  // namespace sonocase::runtime::inline player_session

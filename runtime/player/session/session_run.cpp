@@ -77,7 +77,12 @@ Result<std::unique_ptr<SessionRun>> SessionRun::start(const std::string& path,
         if (open.exercises[i].name == header.exercise)
             header.exercise_digest = open.exercise_digests[i];
     }
-    if (attempt_seed != 0) header.attempt = "seed=" + std::to_string(attempt_seed);
+    const bool exam = engine.exercise().mode == ExerciseMode::exam;
+    if (attempt_seed != 0) {
+        header.attempt = "seed=" + std::to_string(attempt_seed) + (exam ? " mode=exam" : "");
+    } else if (exam) {
+        header.attempt = "mode=exam";
+    }
     SONOCASE_TRY(auto recorder,
                  SessionRecorder::start(path, header, run->exercise_, open.bundle->labels));
     run->recorder_ = std::move(recorder);

@@ -373,7 +373,7 @@ void draw_exam_buttons(Ui& ui, Box row, const ExamSet& set, Requests& requests) 
     ui.text(row, exam_set_words(set), Type::bold, colour::kText, Align::left, true);
 }
 
-void draw_buttons(Ui& ui, Box row, const SessionView& session, Requests& requests) {
+void draw_buttons(Ui& ui, Box row, const SessionView& session, Screen& screen, Requests& requests) {
     const ExamSet& exam_set = session.scan.training.exam_set;
     if (exam_set.runs()) {
         draw_exam_buttons(ui, row, exam_set, requests);
@@ -402,6 +402,15 @@ void draw_buttons(Ui& ui, Box row, const SessionView& session, Requests& request
         if (b.primary) requests.push_back(request::ToggleAttempt{});
         if (b.icon == Icon::replay) requests.push_back(request::StartReplay{});
         if (b.icon == Icon::review) requests.push_back(request::OpenReview{});
+    }
+    if (screen.in_course) {
+        ButtonStyle style;
+        style.icon = Icon::next;
+        style.tip = "How the gate stands, and the next module";
+        const Box box = row.take_right(std::min(60 + ui.width(tr("Course"), Type::body), row.w));
+        if (box.w > 44 && ui.button("course", box, box.w > 80 ? tr("Course") : "", style))
+            screen.page = Page::course;
+        return;
     }
     const CaseState& loaded = session.loaded;
     const auto count = static_cast<int>(loaded.open->exercises.size());
@@ -439,7 +448,7 @@ void draw_after_page(
         ui.text(bar, title + " · " + tr(training.exam ? "exam" : "practice"), Type::body,
                 colour::kDim, Align::left, true);
     Box content = page.content;
-    draw_buttons(ui, content.take_bottom(56, 12), session, requests);
+    draw_buttons(ui, content.take_bottom(56, 12), session, screen, requests);
     if (page.columns >= 2) {
         Box side = content.take_right(std::min(364.0f, 0.34f * content.w), 16);
         draw_advice(ui, side.take_top(std::min(150.0f, 0.4f * side.h), 12), session);

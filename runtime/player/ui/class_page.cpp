@@ -32,7 +32,7 @@ void draw_cell(Ui& ui, const Box& box, const Standing& now) {
             now.attempts ? colour::kText : colour::kDim, Align::left, true);
 }
 
-constexpr float kTableRow = 44, kHeadRow = 44, kMinColumn = 132;
+constexpr float kTableRow = 44, kHeadRow = 44, kMinColumn = 132, kCourseColumn = 112;
 
 // The title of an exercise, where its case is among those of the start page, and the case's.
 struct ExerciseTitle {
@@ -49,18 +49,34 @@ ExerciseTitle title_of(const ClassExercise& exercise, const BundleChooser& choos
     return {exercise.name, exercise.case_name};
 }
 
+// The title of an item, where its case is among those of the start page.
+std::string item_title(const std::string& name,
+                       const ClassExercise& exercise,
+                       const BundleChooser& chooser) {
+    for (const BundleEntry& entry : chooser.bundles) {
+        const auto card = chooser.cards ? chooser.cards->find(entry.path) : nullptr;
+        if (!card || card->case_name != exercise.case_name) continue;
+        for (const CaseCard::Exercise& one : card->exercises)
+            for (const CaseCard::Exercise::Item& item : one.items)
+                if (one.name == exercise.name && item.name == name) return title_of(item);
+    }
+    return name;
+}
+
 // The columns are exercises; where not all fit, arrows go to the others.
 void draw_table_head(ClassPage& page,
                      const BundleChooser& chooser,
                      Ui& ui,
                      Box head,
                      float name,
+                     float of_course,
                      const ClassRecords& records,
                      int shown) {
     const auto all = static_cast<int>(records.exercises.size());
     int& first = page.first_column;
     first = std::clamp(first, 0, std::max(all - shown, 0));
     Box arrows = head.take_left(name);
+    head.take_left(of_course);
     if (all > shown) {
         ButtonStyle style;
         style.ghost = true;
@@ -105,8 +121,14 @@ void draw_table(ClassPage& page,
     Box room = card.inset(16, 12);
     const float name = std::clamp(0.3f * room.w, 110.0f, 220.0f);
     const auto all = static_cast<int>(records.exercises.size());
-    const int shown = std::clamp(static_cast<int>((room.w - name) / kMinColumn), 1, all);
-    draw_table_head(page, chooser, ui, room.take_top(kHeadRow), name, records, shown);
+    const float of_course = records.course.empty() ? 0 : kCourseColumn;
+    const int shown =
+        std::clamp(static_cast<int>((room.w - name - of_course) / kMinColumn), 1, all);
+    Box head = room.take_top(kHeadRow);
+    if (of_course > 0)
+        ui.text({head.x + name + 4, head.y + 1, of_course - 8, 20}, tr("Course"), Type::small,
+                colour::kDim, Align::left, true);
+    draw_table_head(page, chooser, ui, head, name, of_course, records, shown);
     ui.clip(room);
     const double over = kTableRow * static_cast<double>(records.trainees.size()) - room.h;
     ui.scroll_by_wheel(room, page.scroll, std::max(over, 0.0));
@@ -124,6 +146,15 @@ void draw_table(ClassPage& page,
         style.tip = "This trainee's learning curve";
         if (ui.button(trainee.c_str(), row.take_left(name - 8, 8).inset(0, 2), trainee, style))
             page.trainee = trainee;
+        if (const auto found = records.course.find(trainee); found != records.course.end()) {
+            const CourseStanding& now = found->second;
+            const Box box = row.take_left(of_course);
+            const auto modules = static_cast<int>(now.modules.size());
+            std::string words = filled(tr("%d of %d"), now.passed, modules);
+            if (now.due > 0) words += " · " + filled(tr("due: %d"), now.due);
+            ui.text({box.x + 4, box.y, box.w - 8, box.h}, words, Type::small,
+                    now.due > 0 ? colour::kWarn : colour::kText, Align::left, true);
+        }
         for (int i = 0; i < shown; ++i) {
             const int column = page.first_column + i;
             draw_cell(ui, row.column(i, shown, 8),
@@ -230,6 +261,33 @@ void draw_reliability(const BundleChooser& chooser,
     }
 }
 
+// The checklist of the chosen exercise: how often each item was ticked, by the chosen trainee or by
+// everyone.
+void draw_checklist(const std::vector<ChecklistRow>& rows,
+                    const ClassPage& page,
+                    const ClassExercise& exercise,
+                    const BundleChooser& chooser,
+                    Ui& ui,
+                    const Box& card) {
+    ui.card(card, "checklist");
+    Box room = card.inset(16, 12);
+    const std::string who = page.trainee.empty() ? std::string(tr("everyone")) : page.trainee;
+    ui.text(room.take_top(24), std::string(tr("Checklist")) + " · " + who, Type::bold,
+            colour::kText, Align::left, true);
+    for (const ChecklistRow& row : rows) {
+        if (room.h < 24) return;
+        const Box line = room.take_top(24);
+        const bool always = row.ticked == row.attempts;
+        ui.icon(row.last ? Icon::pass : Icon::fail, line.x, line.y + 3, 16,
+                row.last ? colour::kGood : colour::kBad);
+        ui.text({line.x + 24, line.y, line.w - 80, line.h}, item_title(row.name, exercise, chooser),
+                row.critical ? Type::bold : Type::small, colour::kText, Align::left, true);
+        ui.text({line.right() - 56, line.y, 56, line.h},
+                filled("%d / %d", row.ticked, row.attempts), Type::small,
+                always ? colour::kGood : colour::kWarn, Align::right, true);
+    }
+}
+
 void draw_files(PlayerState& player, ClassPage& page, Ui& ui, Box row) {
     const struct {
         const char *id, *words, *tip;
@@ -333,9 +391,18 @@ void draw_class_page(PlayerState& player,
     }
     if (layout.columns >= 3) {
         Box side = content.take_right(0.34f * content.w, 16);
-        if (side.h > 420)
+        const auto at =
+            std::min(static_cast<std::size_t>(page.exercise), records.exercises.size() - 1);
+        const ClassExercise& exercise = records.exercises[at];
+        const std::vector<ChecklistRow> rows = records.checklist(page.trainee, exercise);
+        if (side.h > 420 && !rows.empty()) {
+            const float high = 48 + 24 * static_cast<float>(rows.size());
+            draw_checklist(rows, page, exercise, chooser, ui,
+                           side.take_bottom(std::min(0.58f * side.h, high), 12));
+        } else if (side.h > 420) {
             draw_reliability(chooser, ui, side.take_bottom(std::min(0.4f * side.h, 260.0f), 12),
                              records);
+        }
         draw_curves(page, chooser, ui, side, records);
     } else if (content.h > 420) {
         draw_curves(page, chooser, ui, content.take_bottom(200, 12), records);

@@ -306,13 +306,20 @@ void choose_picture(const ImageChoice& image, Ui& ui, Box box, Requests& request
 }
 
 // Everything that can be opened, so that whatever was closed comes back.
-void draw_settings(
-    const CaseState& loaded, Settings& settings, ViewState& view, Ui& ui, Requests& requests) {
+// course: there is one to be opened.
+void draw_settings(const CaseState& loaded,
+                   Settings& settings,
+                   bool course,
+                   ViewState& view,
+                   Ui& ui,
+                   Requests& requests) {
     Screen& screen = view.screen;
     const bool scanning = loaded.open && screen.page == Page::scan;
     const bool low = ui.window().h < 480;  // two rows in one, so that no button is left out
-    Box room =
-        begin_page_dialog(ui, screen, "Settings", low ? 640.0f : 560.0f, scanning ? 508 : 310);
+    Box room = begin_page_dialog(ui, screen, "Settings", low ? 640.0f : 560.0f,
+                                 scanning ? 508.0f
+                                 : course ? 362.0f
+                                          : 310.0f);
     Box first = room.take_top(44, 8);
     if (low) choose_language(settings, ui, first.take_right(0.47f * first.w, 16));
     choose_size(*view.display.window, settings, ui, first);
@@ -335,6 +342,7 @@ void draw_settings(
         {"Exercises", Icon::target, true, "Another exercise of this case (F5)"},
         {"Sign in", Icon::user, false, "Whose scores are kept"},
         {"Class", Icon::group, false, "Everyone's progress"},
+        {"Course", Icon::next, false, "Modules in order, each with its gate"},
         {"Set-up", Icon::probe, true, "Calibrate probe, needle and mannequin (F3)"},
         {"Tracker", Icon::link, true, "Which tracker, and how it does (F9)"},
         {"Effects", Icon::timer, true, "What each effect costs (F10)"},
@@ -348,6 +356,7 @@ void draw_settings(
     Box row;
     for (const Item& item : kItems) {
         if (item.scanning && !scanning) continue;
+        if (item.icon == Icon::next && (!course || scanning)) continue;
         if (i % columns == 0) row = room.take_top(44, 8);
         ButtonStyle style;
         style.icon = item.icon;
@@ -364,6 +373,7 @@ void draw_settings(
             case Icon::target: screen.dialog = Dialog::exercises; break;
             case Icon::user: screen.dialog = Dialog::sign_in; break;
             case Icon::group: screen.page = Page::group; break;
+            case Icon::next: screen.page = Page::course; break;
             case Icon::probe: screen.show_setup = true; break;
             case Icon::link: screen.dialog = Dialog::tracker; break;
             case Icon::timer: screen.dialog = Dialog::effects; break;
@@ -481,7 +491,8 @@ void draw_dialogs(
         case Dialog::none: return;
         case Dialog::help: draw_help(screen, ui); return;
         case Dialog::settings:
-            draw_settings(session.loaded, player.settings, view, ui, requests);
+            draw_settings(session.loaded, player.settings, !player.progress.courses.empty(), view,
+                          ui, requests);
             return;
         case Dialog::sign_in: draw_sign_in(player, view, ui); return;
         case Dialog::notices: draw_notices(player.notices, player.now_s, screen, ui); return;

@@ -206,7 +206,7 @@ void go_back(const SessionView& session, ViewState& view, Ui& ui, Requests& requ
         view.screen.page = Page::scan;
     } else if (session.scan.replay.runs()) {
         requests.push_back(request::EndReplay{});
-    } else if (view.screen.page == Page::group) {
+    } else if (view.screen.page == Page::group || view.screen.page == Page::course) {
         view.screen.page = Page::bundles;
     } else if (view.screen.page == Page::bundles && session.loaded.open) {
         view.screen.page = Page::scan;
@@ -362,6 +362,11 @@ void handle_keys(const SessionView& session,
         screen.dialog == Dialog::new_target || screen.dialog == Dialog::label)
         return;
     if (screen.page == Page::group) return;
+    if (screen.page == Page::course) {
+        if (screen.dialog == Dialog::none && !ui.has_focus() && pressed(GLFW_KEY_ENTER))
+            press_course_primary(session.progress, view.chooser, view.course_page, requests);
+        return;
+    }
     if (screen.page == Page::bundles) {
         if (screen.dialog == Dialog::none)
             handle_bundle_keys(session.progress, view.chooser, ui, requests);

@@ -64,6 +64,21 @@ void draw_class_page(PlayerState& player,
                      Screen& screen,
                      Ui& ui,
                      Requests& requests);
+// The page of the course in use, of which there is one.
+void draw_course_page(Progress& progress,
+                      Notices& notices,
+                      const BundleChooser& chooser,
+                      CoursePage& page,
+                      Screen& screen,
+                      Ui& ui,
+                      Requests& requests);
+// The course on the start page; false: there is none, or no room.
+bool draw_course_card(const Progress& progress, Screen& screen, Ui& ui, Box& side);
+// What Enter does on the page of a course: begins the module that is shown.
+void press_course_primary(const Progress& progress,
+                          const BundleChooser& chooser,
+                          const CoursePage& page,
+                          Requests& requests);
 // What is open over the page.
 void draw_dialogs(
     const SessionView& session, PlayerState& player, ViewState& view, Ui& ui, Requests& requests);

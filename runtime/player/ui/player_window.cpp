@@ -2,6 +2,7 @@
 
 #include "runtime/player/ui/player_window.h"
 
+#include <algorithm>
 #include <utility>
 
 #include <imgui.h>
@@ -73,7 +74,10 @@ void PlayerWindow::show_setup(const TrackerHealth& tracker) {
 void PlayerWindow::draw_page(const TrackerHealth& tracker) {
     Screen& screen = view_.screen;
     begin_page();
-    if (!loaded_.open && screen.page != Page::group) screen.page = Page::bundles;
+    if (screen.page == Page::course && player_.progress.courses.empty())
+        screen.page = Page::bundles;
+    if (!loaded_.open && screen.page != Page::group && screen.page != Page::course)
+        screen.page = Page::bundles;
     if (screen.page == Page::after && !scan_.training.result) screen.page = Page::scan;
     const SessionView session = this->session(tracker);
     switch (screen.page) {
@@ -93,6 +97,10 @@ void PlayerWindow::draw_page(const TrackerHealth& tracker) {
             note_exam_result(scan_.training);
             draw_after_page(session, player_.notices, screen, ui_, requests_);
             break;
+        case Page::course:
+            draw_course_page(player_.progress, player_.notices, view_.chooser, view_.course_page,
+                             screen, ui_, requests_);
+            break;
         case Page::group:
             draw_class_page(player_, view_.class_page, view_.chooser, session.case_open(), screen,
                             ui_, requests_);
@@ -105,6 +113,9 @@ void PlayerWindow::draw_page(const TrackerHealth& tracker) {
 
 void PlayerWindow::show_bundles() {
     view_.chooser.bundles = find_bundles(player_.settings.recent);
+    player_.progress.courses = find_courses(player_.arguments.course, player_.notices);
+    player_.progress.course = std::min(
+        player_.progress.course, std::max<std::size_t>(player_.progress.courses.size(), 1) - 1);
     view_.chooser.asked = false;
     view_.screen.dialog = Dialog::none;
     view_.screen.page = Page::bundles;
@@ -125,8 +136,14 @@ void PlayerWindow::carry_out(const request::OpenCase& wanted) {
         if (wanted.typed) view_.chooser.typing = false;
         if (wanted.then == Then::practise || wanted.then == Then::exam)
             start_attempt(player_, loaded_, scan_, "", wanted.then == Then::exam);
+        if (wanted.then == Then::expert) (void)watch_expert(player_, loaded_, scan_, wanted.sweep);
+        view_.screen.in_course = wanted.in_course;
     }
     if (wanted.then == Then::guide && loaded_.open) scan_.training.guide.emplace();
+}
+
+void PlayerWindow::carry_out(const request::AnswerCourse& wanted) {
+    answer_course(player_, wanted.module, wanted.option);
 }
 
 void PlayerWindow::carry_out(const request::ShowCases& wanted) {
@@ -178,7 +195,9 @@ void PlayerWindow::carry_out(const request::PerformAct& wanted) {
 
 void PlayerWindow::carry_out(const request::EndReplay&) {
     end_replay(player_, loaded_, scan_);
-    view_.screen.page = Page::after;
+    // Of an expert there is no result.
+    view_.screen.page =
+        view_.screen.in_course && !scan_.training.result ? Page::course : Page::after;
 }
 
 void PlayerWindow::carry_out(const request::OpenReview&) {

@@ -43,6 +43,7 @@ class PlayerWindow {
     void show_bundles();
     void carry_out_requests();
     void carry_out(const request::OpenCase& wanted);
+    void carry_out(const request::AnswerCourse& wanted);
     void carry_out(const request::ShowCases& wanted);
     void carry_out(const request::Quit& wanted);
     void carry_out(const request::ChooseExercise& wanted);

@@ -15,10 +15,16 @@ namespace sonocase::runtime::inline player_ui {
 namespace request {
 
 struct OpenCase {
-    enum class Then { scan, practise, exam, guide };
+    enum class Then { scan, practise, exam, guide, expert };
     std::string path{}, exercise{};  // exercise empty: the first
     Then then = Then::scan;
-    bool typed = false;  // the path was typed on the start page
+    bool typed = false;      // the path was typed on the start page
+    std::string sweep{};     // of the expert
+    bool in_course = false;  // the way back leads to the course
+};
+struct AnswerCourse {
+    std::string module{};
+    int option = 0;
 };
 // asked_by: the key or button, for the question whether a running attempt may end.
 struct ShowCases {
@@ -98,6 +104,7 @@ struct SaveMarks {};
 }  // namespace request
 
 using Request = std::variant<request::OpenCase,
+                             request::AnswerCourse,
                              request::ShowCases,
                              request::Quit,
                              request::ChooseExercise,

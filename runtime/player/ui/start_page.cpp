@@ -368,6 +368,7 @@ void draw_start_page(const Progress& progress,
              tr("Search cases and exercises"));
     if (wide) {
         draw_continue(progress, chooser, ui, side, requests);
+        draw_course_card(progress, screen, ui, side);
         draw_guide_card(progress, chooser, ui, side, requests);
         draw_open(chooser, screen, ui, side, requests);
         draw_faults(chooser, ui, side);

@@ -93,7 +93,39 @@ TEST(ProgressBook, OneOfVersionOneIsBroughtUpToDate) {
     ASSERT_EQ(all->size(), 2u);
     EXPECT_EQ((*all)[0].id, 7);
     EXPECT_EQ((*all)[0].seed, 0u);
+    EXPECT_FALSE((*all)[0].exam);
+    EXPECT_TRUE((*all)[0].items.empty());
+    EXPECT_TRUE(ProgressBook::open(path)->add(CourseAnswer{"Ada", "a", "b", 1}));
     EXPECT_EQ((*all)[1].seed, 1003u);
+}
+
+TEST(ProgressBook, KeepsChecklistsExamsAndAnswersUntilTheTraineeIsRemoved) {
+    const TemporaryFolder folder(/*in_memory=*/true);
+    const std::string path = folder / "progress.sqlite";
+    auto book = ProgressBook::open(path);
+    ASSERT_TRUE(book);
+    ProgressEntry e = entry("Ada", 1);
+    e.exam = true;
+    e.items = {{"way-found", true, true}, {"numbed", false, false}};
+    ASSERT_TRUE(book->add(e));
+    ASSERT_TRUE(book->add(e));  // scored again
+    ASSERT_TRUE(book->add(CourseAnswer{"Ada", "first-needles", "knobs", 0}));
+    ASSERT_TRUE(book->add(CourseAnswer{"Ada", "first-needles", "planes", 2}));
+    ASSERT_TRUE(book->add(CourseAnswer{"Ada", "first-needles", "knobs", 1}));
+    ASSERT_TRUE(book->add(CourseAnswer{"Bob", "first-needles", "knobs", 2}));
+    auto again = ProgressBook::open(path);
+    ASSERT_TRUE(again);
+    const auto sessions = again->sessions("Ada", "");
+    ASSERT_TRUE(sessions);
+    ASSERT_EQ(sessions->size(), 1u);
+    EXPECT_TRUE((*sessions)[0].exam);
+    EXPECT_EQ((*sessions)[0].items, e.items);
+    EXPECT_EQ(*again->answers("Ada"),
+              (std::vector<CourseAnswer>{{"Ada", "first-needles", "planes", 2},
+                                         {"Ada", "first-needles", "knobs", 1}}));
+    ASSERT_TRUE(again->remove_trainee("Ada"));
+    EXPECT_TRUE(again->answers("Ada")->empty());
+    EXPECT_EQ(again->answers("")->size(), 1u);
 }
 
 // The start is known to the second only.

@@ -366,6 +366,21 @@ TEST(DopplerView, AimsAtTheVesselThatThePlaneCutsAndAtNoOther) {
     ASSERT_TRUE(along);
     EXPECT_EQ(std::abs(along->steer_deg), 20);
     EXPECT_NEAR(std::abs(along->angle_deg), 70, 1.5);
+    // The fastest blood, seen at that angle, fills three quarters of the scale; in steps of 5.
+    const FlowVessel& vessel = bundle.flow.vessels.front();
+    const double area_mm2 = section_area_mm2(bundle.flow.nodes[vessel.first_node].radius_mm);
+    const double fastest_cm_s =
+        0.1 * velocity_range(vessel, area_mm2, 60 / exercise.pulsation.rate_per_min).peak *
+        std::cos(along->angle_deg * kPi / 180);
+    EXPECT_GE(along->spectral_scale_cm_s, fastest_cm_s / 0.75);
+    EXPECT_LE(along->spectral_scale_cm_s, std::max(fastest_cm_s / 0.75 + 5.5, 10.0));
+    EXPECT_EQ(std::fmod(along->spectral_scale_cm_s, 5), 0);
+    // A slow vessel has a small scale, so that its trace is no flat line.
+    CaseBundle slow = bundle;
+    slow.flow.vessels.front().mean_ml_s /= 8;
+    const auto slow_view = DopplerView::create(slow, exercise, {});
+    ASSERT_TRUE(slow_view) << slow_view.error().message();
+    EXPECT_EQ(slow_view->aim(input, settings, true)->spectral_scale_cm_s, 10);
     // Beside the vessel there is none.
     input.mannequin_from_probe.translation = {30, 0, 60};
     EXPECT_FALSE(view->aim(input, settings, true));

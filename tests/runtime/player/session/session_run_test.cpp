@@ -4,6 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <memory>
+
 #include "runtime/player/session/clock.h"
 #include "runtime/recording/session_words.h"
 #include "runtime/tracking/replay_tracker.h"
@@ -99,6 +102,116 @@ TEST(SessionRun, AReplayGivesTheSamePixelsToTheLastBit) {
         apply_settings_text(replay->settings[i], settings);
         engine.frame(now_s, settings, pixels);
         ASSERT_EQ(pixels, shown[i]) << "frame " << i;
+    }
+}
+
+// A cyst to be drained: numbed outside it, emptied, and the needle rests in it.
+Exercise draining() {
+    Exercise exercise = testing::small_exercise();
+    exercise.targets[0] = {"cyst", {25, 0, 35}, 8, 8, TargetLook::cyst};
+    Procedure& p = exercise.procedure;
+    ProcedureStep numb, rest, empty;
+    numb.name = "numb";
+    numb.done.act = static_cast<int>(ActKind::inject);
+    numb.done.at_least = 3;
+    numb.done.tip_not_in = {"cyst"};
+    rest.name = "rest";
+    rest.done.needle_in = 1;
+    rest.done.hold_s = 0.4;
+    empty.name = "empty";
+    empty.done.act = static_cast<int>(ActKind::drain);
+    empty.done.drained_at_least = 0.5;
+    p.steps = {numb, rest, empty};
+    for (int i = 0; i < 3; ++i) {
+        ProcedureItem item;
+        item.name = p.steps[static_cast<std::size_t>(i)].name;
+        item.step = i;
+        p.items.push_back(item);
+    }
+    return exercise;
+}
+
+// The needle goes down to the cyst's middle in 2 s and stays there; 6 s at 40 readings a second.
+TrackerReading draining_at(int i) {
+    TrackerReading r;
+    r.sequence = static_cast<std::uint64_t>(i) + 1;
+    r.time_s = i / 40.0;
+    r.in_mannequin = true;
+    r.sensor_count = 2;
+    r.sensors[kProbeSensor].state = SensorState::ok;
+    r.sensors[kProbeSensor].world_from_sensor = {
+        Matrix3::from_columns({1, 0, 0}, {0, -1, 0}, {0, 0, -1}), {0, 0, 59}};
+    const double above_mm = std::max(0.0, 30 - 30.0 * i / 80);
+    r.sensors[kNeedleSensor].state = SensorState::ok;
+    r.sensors[kNeedleSensor].world_from_sensor = {
+        Matrix3::from_columns({1, 0, 0}, {0, -1, 0}, {0, 0, -1}), {25, 0, 35 + above_mm}};
+    if (i == 30) r.acts.add({ActKind::inject, 0, 1});
+    if (i == 40) r.acts.add({ActKind::inject, 0, 2});
+    if (i == 120) r.acts.add({ActKind::drain, 0, 1});
+    if (i == 160) r.acts.add({ActKind::drain, 0, 0.4});
+    return r;
+}
+
+TEST(SessionRun, AJumpInAReplayLeadsToTheStateOfPlayingIt) {
+    const testing::TemporaryFolder folder;
+    const std::string path = folder / "s.igs.mha";
+    auto open = small_open_case();
+    open->exercises = {draining()};
+    std::vector<std::uint8_t> pixels(128 * 128);
+    {
+        ScanEngine engine = engine_of(*open);
+        auto run = SessionRun::start(path, *open, engine, "", utc_now(), 0);
+        ASSERT_TRUE(run) << run.error().message();
+        for (int i = 0; i < 240; ++i) {
+            engine.observe(draining_at(i), false);
+            engine.frame(i / 40.0, {}, pixels);
+            (*run)->observe(engine.last(), pixels, true);
+        }
+        ASSERT_TRUE((*run)->finish());
+    }
+    const auto recording = load_recording(path);
+    ASSERT_TRUE(recording) << recording.error().message();
+    // The replay runs on to from_s, jumps, and goes on to its end; at 40 pictures a second.
+    const auto replay = [&](double from_s, double jump_s) {
+        PacedTracker tracker(std::make_unique<ReplayTracker>(*recording, true));
+        ScanEngine engine = engine_of(*open);
+        bool jumped = false;
+        for (int i = 0;; ++i) {
+            const double now_s = 50 + i / 40.0;
+            TrackerReading reading;
+            if (!jumped && now_s - 50 >= from_s && jump_s != 0) {
+                tracker.jump(jump_s);
+                jumped = true;
+            }
+            if (tracker.poll(now_s, reading)) {
+                engine.observe(reading, false);
+                if (reading.restarts) engine.pass_over(tracker.passed_over());
+            }
+            engine.frame(now_s, {}, pixels);
+            if ((jumped || jump_s == 0) && tracker.at_s() > 5.9) return engine.procedure();
+            if (i > 2000) return engine.procedure();
+        }
+    };
+    const ProcedureRun played = replay(0, 0);
+    ASSERT_EQ(played.result().points, 3);
+    ASSERT_NEAR(played.state().drained_ml, 1.4, 1e-9);
+    struct Jump {
+        double from_s, by_s;
+    };
+    // Over injections, over all of it, back before the first act, back between two drains.
+    for (const Jump jump : {Jump{0.2, 3.5}, {0.1, 5.5}, {4.5, -4.3}, {5, -1.5}}) {
+        const ProcedureRun run = replay(jump.from_s, jump.by_s);
+        EXPECT_EQ(run.state().injected_ml, played.state().injected_ml) << jump.by_s;
+        EXPECT_EQ(run.state().drained_ml, played.state().drained_ml) << jump.by_s;
+        EXPECT_EQ(run.scene().target_scale[0], played.scene().target_scale[0]) << jump.by_s;
+        EXPECT_EQ(run.state().pool_count, played.state().pool_count) << jump.by_s;
+        const ProcedureResult list = run.result(), wanted = played.result();
+        for (std::size_t i = 0; i < wanted.items.size(); ++i) {
+            EXPECT_EQ(list.items[i].ticked, wanted.items[i].ticked) << jump.by_s;
+            // Moments count from the recording's first reading.
+            EXPECT_NEAR(list.items[i].time_s, wanted.items[i].time_s - 50, 0.026)
+                << wanted.items[i].name << " " << jump.by_s;
+        }
     }
 }
 

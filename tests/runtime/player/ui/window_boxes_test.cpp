@@ -43,11 +43,11 @@ std::vector<SeenBox> load_boxes(const std::string& file) {
     return boxes;
 }
 
-const char* const kPages[] = {"scan",    "attempt",  "frozen",   "after",  "replay",
-                              "help",    "tracker",  "effects",  "cases",  "exercises",
-                              "setup",   "colour",   "spectrum", "motion", "named",
-                              "marks",   "settings", "notices",  "class",  "sign_in",
-                              "longest", "question", "asked",    "tray",   "checklist"};
+const char* const kPages[] = {"scan",      "attempt", "frozen",  "after",     "replay",   "help",
+                              "tracker",   "effects", "cases",   "exercises", "setup",    "colour",
+                              "spectrum",  "motion",  "named",   "marks",     "settings", "notices",
+                              "class",     "sign_in", "longest", "question",  "asked",    "tray",
+                              "checklist", "course",  "module",  "locked"};
 
 // A procedure with as many acts as the tray has keys, long words, and a question.
 const char* const kProcedure = R"(name = "procedure"
@@ -130,7 +130,9 @@ std::string script(const std::string& folder) {
            shot("notices") + "key escape\npress settings\nwait 2\npress Sign in\nwait 2\n" +
            shot("sign_in") +
            "key escape\npress settings\nwait 2\npress Class\nwait 4\npress Ann Onymous\nwait 2\n" +
-           shot("class") + "quit\n";
+           shot("class") + "key escape\npress settings\nwait 2\npress Course\nwait 4\n" +
+           shot("course") + "press option1\nwait 4\n" + shot("module") +
+           "press module_second\nwait 4\n" + shot("locked") + "quit\n";
 }
 
 void check(const std::vector<SeenBox>& boxes, double width, double height) {
@@ -173,6 +175,34 @@ metric = "needle_in_beam_fraction"
 at_least = 0.55
 )";
 
+// Its words are as long as those of the course at hand.
+const char* const kCourse = R"(name = "course"
+title = "A course with a title that does not go on for ever"
+text = "From the first picture to a central line: modules in order, each with a gate. A wrong answer costs nothing."
+[[modules]]
+name = "first"
+title = "The first of two modules"
+text = """Depth first: what you look for should fill three quarters of the picture. Then focus to its depth, then gain until fluid
+is just black, then the sliders of the TGC until one tissue has one grey from top to bottom."""
+case = "cylinder"
+exercise = "procedure"
+expert = "along"
+question = "You cannot see the far side of the kidney, which lies below the picture's edge. What first?"
+options = ["More gain", "More depth, until what is looked for fills three quarters", "Press harder"]
+answer = 1
+because = "Only depth shows what lies below the edge; gain makes brighter what is shown already."
+practice = { measure = "needle_in_beam_fraction", at_least = 0.6 }
+gate = { passes_in_a_row = 3, steady = true }
+retention_days = 30
+[[modules]]
+name = "second"
+title = "The second"
+text = "Short."
+case = "elsewhere"
+exercise = "procedure"
+gate = { passes_in_a_row = 1, exam = true }
+)";
+
 // A class whose names, exercises and attempts are more than a small window shows.
 void fill_book(const std::string& path) {
     auto book = ProgressBook::open(path);
@@ -196,6 +226,10 @@ void fill_book(const std::string& path) {
                 ++minute;
                 entry.passed = (minute + e) % 3 == 0;
                 entry.metrics = {{"final_tip_to_target_mm", 12.0 - 2 * k}};
+                if (e == 0)
+                    for (const char* item :
+                         {"way-found", "an-item-with-a-long-name-of-its-own", "numbed"})
+                        entry.items.push_back({item, true, k > 1});
                 ASSERT_TRUE(book->add(entry));
             }
         }
@@ -212,6 +246,7 @@ void tour(const std::string& size, double scale, const std::string& language) {
     bundle.exercises.push_back({"procedure", kProcedure});
     ASSERT_TRUE(save_bundle(bundle, place + "/cylinder.sonocase"));
     folder.write("home/sonocase/player.json", R"({"sound": false})");
+    folder.write("home/course.toml", kCourse);
     fill_book(place + "/sonocase/progress.sqlite");
     folder.write("script", script(folder.path()));
     const auto result = sonocase::testing::run_command(
@@ -236,6 +271,17 @@ void tour(const std::string& size, double scale, const std::string& language) {
         // The script came where it meant to.
         if (page == std::string("class")) {
             EXPECT_TRUE(has("csv") && has("Ann Onymous"));
+        }
+        if (page == std::string("course")) {
+            EXPECT_TRUE(has("module_first"));
+            EXPECT_TRUE(has("option1") || width_px / used < 1200);  // else below, to be scrolled to
+        }
+        if (page == std::string("module") || page == std::string("locked")) {
+            EXPECT_TRUE(has("begin"));
+            // A small window has room for one module, and its question is scrolled to.
+            if (width_px / used >= 1200) {
+                EXPECT_TRUE(has("module_second") && !has("option1"));
+            }
         }
         if (page == std::string("marks")) {
             EXPECT_TRUE(has("save") && has("plus"));

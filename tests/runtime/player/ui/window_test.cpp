@@ -33,10 +33,12 @@ class WindowOnVirtualDisplay : public ::testing::Test {
     }
     CommandResult run(const std::string& arguments,
                       const std::string& script,
-                      const std::string& screen) {
+                      const std::string& screen,
+                      const std::string& language = "C") {
         folder_.write("script", script);
         return sonocase::testing::run_command(
-            "env XDG_CONFIG_HOME=" + (folder_ / "config") + " XDG_DATA_HOME=" + (folder_ / "data") +
+            "env LC_ALL=" + language + " XDG_CONFIG_HOME=" + (folder_ / "config") +
+            " XDG_DATA_HOME=" + (folder_ / "data") +
             " " SONOCASE_SOURCE "/tests/support/on-display " + screen +
             " " SONOCASE_BIN "/sonoplay " + arguments + " --script " + (folder_ / "script"));
     }
@@ -130,6 +132,55 @@ TEST_F(WindowOnVirtualDisplay, ANewcomerIsAtTheSecondAttemptAfterSevenInputs) {
         sessions += entry.path().string().find(".frames.") == std::string::npos;
     }
     EXPECT_EQ(sessions, 2);
+}
+
+// From the start page into the course: the course, the answer, Enter. The bar is six.
+TEST_F(WindowOnVirtualDisplay, ANewcomerIsAtTheFirstStepOfTheCourseAfterThreeInputs) {
+    std::filesystem::create_directories(folder_ / "data/sonocase/cases");
+    std::filesystem::copy(bundle_, folder_ / "data/sonocase/cases/cylinder.sonocase");
+    std::string course = "name = \"short\"\ntitle = \"A short course\"\n";
+    for (const char* name : {"first", "second"})
+        course += std::string("[[modules]]\nname = \"") + name +
+                  "\"\ntext = \"What to know.\"\ncase = \"" +
+                  sonocase::testing::small_case().manifest.case_name +
+                  "\"\nexercise = \"scan\"\nexpert = \"along\"\n"
+                  "question = \"Which?\"\noptions = [\"This\", \"That\"]\nanswer = 1\n"
+                  "because = \"For this reason.\"\n"
+                  "practice = { measure = \"final_tip_to_target_mm\", at_most = 5 }\n"
+                  "gate = { passes_in_a_row = 2, steady = true }\nretention_days = 30\n";
+    folder_.write("data/sonocase/cases/course.toml", course);
+    const std::string shots = folder_.path() + "/";
+    const std::string way = "wait 60\npress course\nwait 4\nshot " + shots +
+                            "question.png\npress option0\nwait 4\nshot " + shots +
+                            "text.png\nkey enter\nwait 6\nshot " + shots + "step.png\n";
+    int inputs = 0;
+    for (std::size_t at = 0; at < way.size(); at = way.find('\n', at) + 1)
+        inputs += way.compare(at, 4, "key ") == 0 || way.compare(at, 6, "press ") == 0;
+    EXPECT_EQ(inputs, 3);
+    // The attempt's result leads back; the expert plays and Escape leads back too.
+    const std::string back = "key b\nwait 4\npress course\nwait 4\nshot " + shots +
+                             "back.png\npress module_second\nwait 4\nshot " + shots +
+                             "locked.png\npress expert\nwait 10\nshot " + shots +
+                             "expert.png\nkey escape\nwait 4\nshot " + shots + "after.png\nquit\n";
+    for (const char* language : {"C", "de_DE.UTF-8"}) {
+        const CommandResult result =
+            run("--size 1280x720 --model paper", way + back, "1280x720", language);
+        ASSERT_EQ(result.status, 0) << result.error;
+        const auto has = [&](const char* shot, const std::string& name) {
+            return sonocase::testing::read_text(shots + shot + ".png.boxes").find(name) !=
+                   std::string::npos;
+        };
+        EXPECT_TRUE(has("question", " option0\n"));
+        EXPECT_FALSE(has("question", "What to know."));  // asked before it is read
+        EXPECT_TRUE(has("text", "What to know."));
+        EXPECT_TRUE(has("text", "For this reason."));
+        EXPECT_TRUE(has("step", " hint\n"));  // an attempt at practice runs
+        EXPECT_TRUE(has("back", " module_first\n"));
+        EXPECT_TRUE(has("locked", "A short course"));
+        EXPECT_TRUE(has("expert", " time\n"));  // the time line of what is played
+        EXPECT_TRUE(has("after", " module_first\n"));
+        std::filesystem::remove_all(folder_ / "data/sonocase/sessions");
+    }
 }
 
 // Colour never on the picture, frozen or live: the sector stays grey (saturation at most 0.15).
