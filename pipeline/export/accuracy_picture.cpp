@@ -28,9 +28,8 @@ ChartSheet sheet_of(const CaseAccuracy& accuracy) {
     sheet.height_px = 420;
     Chart parts;
     parts.title = "Where the millimetres come from";
-    parts.x_label = "part";
     parts.y_label = "mean displacement of surfaces, mm";
-    parts.y_log = true;  // parts differ by a hundredfold, and none may hide
+    parts.x_of_things = true;
     double at = 0;
     for (const BudgetEntry& e : accuracy.budget.entries) {
         at += 1;
@@ -44,8 +43,8 @@ ChartSheet sheet_of(const CaseAccuracy& accuracy) {
     if (!accuracy.places.empty()) {
         Chart places;
         places.title = "Known least: nine times in ten within";
-        places.x_label = "structure";
         places.y_label = "mm";
+        places.x_of_things = true;
         Series held{"with two landmarks", {}, {}, SeriesStyle::diamonds, {27, 31, 36}, 6};
         for (std::size_t i = 0; i < std::min(accuracy.places.size(), kPlaces); ++i) {
             const UnknownPlace& p = accuracy.places[i];

@@ -103,7 +103,7 @@ Layout lay_out(const Chart& chart, const Area& area) {
         if (!chart.equal_axes) break;
         equalise(layout.x, layout.y);
     }
-    layout.x_ticks = fitting_ticks(layout.x, false);
+    if (!chart.x_of_things) layout.x_ticks = fitting_ticks(layout.x, false);
     return layout;
 }
 

@@ -67,6 +67,20 @@ std::vector<LegendItem> six_items() {
         {"paper", SeriesStyle::dashed, {9, 9, 9, 255}, 12}};
 }
 
+// Bars of things that the legend names: "1.5" along the axis would be a part and a half.
+TEST(Chart, ThingsHaveNoNumbersAlongTheAxis) {
+    Chart chart;
+    chart.series = {{"import", {1}, {0.9}, SeriesStyle::bars},
+                    {"warp", {2}, {0.2}, SeriesStyle::bars}};
+    const auto has = [&](const std::string& tick) {
+        return chart_svg({{chart}}).find(">" + tick + "<") != std::string::npos;
+    };
+    EXPECT_TRUE(has("1.5"));
+    chart.x_of_things = true;
+    EXPECT_FALSE(has("1.5"));
+    EXPECT_TRUE(has("0.6"));
+}
+
 TEST(ChartLegend, FrameHoldsWordsAndSymbolsAndNothingOverlaps) {
     const Legend legend = lay_out_legend(six_items(), 700);
     ASSERT_EQ(legend.entries.size(), 6u);
