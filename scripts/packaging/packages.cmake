@@ -22,7 +22,7 @@ endfunction()
 function(install_sbom package file component)
   set(made ${CMAKE_BINARY_DIR}/sbom/${package}.cdx.json)
   find_program(DPKG_QUERY dpkg-query)
-  if(DPKG_QUERY)
+  if(DPKG_QUERY AND EXISTS /usr/bin/python3)
     install(CODE "execute_process(COMMAND ${packaging}/sbom ${file} ${made} ${PROJECT_VERSION} COMMAND_ERROR_IS_FATAL ANY)"
             COMPONENT ${component})
     install(FILES ${made} DESTINATION ${share}/doc/${package} RENAME sbom.cdx.json COMPONENT ${component})
