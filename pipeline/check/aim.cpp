@@ -404,7 +404,7 @@ std::vector<std::uint8_t> aim_picture(const CaseLabels& labels,
         stroke(w.skin, target.centre, {255, 255, 0});
         if (w.needle) stroke(w.entry - 30 * w.needle_direction, target.centre, {0, 255, 255});
         for (int s = 0; s < 360; ++s) {
-            const double a = s * 3.14159265 / 180;
+            const double a = s * kRadPerDeg;
             const Point3 p = target.centre + target.radius_mm * std::cos(a) * w.lateral +
                              target.radius_mm * std::sin(a) * w.beam;
             stroke(p, p, {255, 0, 0});

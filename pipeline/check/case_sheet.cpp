@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/base/constants.h"
 #include "formats/exercise/exercise.h"
 #include "pipeline/base/text.h"
 #include "pipeline/check/case_labels.h"
@@ -161,7 +162,7 @@ Panel window(const CaseLabels& labels, const Exercise& exercise) {
     if (!exercise.targets.empty()) {
         const Target& target = exercise.targets.front();
         for (int s = 0; s < 360; ++s) {
-            const double a = s * 3.14159265 / 180;
+            const double a = s * kRadPerDeg;
             const Point3 p = target.centre + target.radius_mm * std::cos(a) * view.across +
                              target.radius_mm * std::sin(a) * view.down;
             stroke(view, p, p, {255, 255, 0}, panel);

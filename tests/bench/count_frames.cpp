@@ -22,10 +22,10 @@
 #include "formats/files/load_save.h"
 #include "formats/machine/machine.h"
 #include "runtime/engine/skin.h"
-#include "runtime/imaging/core/scan_geometry.h"
 #include "runtime/imaging/doppler/doppler_view.h"
 #include "runtime/imaging/renderer.h"
 #include "runtime/player/headless/run_headless.h"
+#include "runtime/player/session/effect_trials.h"
 #include "runtime/tracking/scripted_sweep.h"
 
 // In place of Highway's own, which its library calls as it is loaded: that reads the time-stamp
@@ -231,15 +231,6 @@ std::vector<FrameInput> frames_of(const Exercise& exercise, const Skin& skin) {
     return frames;
 }
 
-double scanned_pixels(const Probe& probe) {
-    const ScanGeometry geometry = make_scan_geometry(probe, 2, 2, kSize, kSize);
-    double count = 0, line = 0, sample = 0;
-    for (int row = 0; row < kSize; ++row)
-        for (int column = 0; column < kSize; ++column)
-            count += geometry.locate(geometry.pixel_centre(column, row), line, sample) ? 1 : 0;
-    return count;
-}
-
 void count_effects(const std::string& path) {
     const auto bundle = load_bundle(path);
     must(static_cast<bool>(bundle), path + " cannot be read");
@@ -255,8 +246,8 @@ void count_effects(const std::string& path) {
         options.textures = textures;
         auto renderer = Renderer::create(*bundle, *exercise, options);
         must(static_cast<bool>(renderer), "no renderer");
-        using Pictures = std::vector<std::vector<std::uint8_t>>;
-        const Pictures blank(frames.size(), std::vector<std::uint8_t>(kSize * kSize));
+        using Pictures = std::vector<Picture>;
+        const Pictures blank(frames.size(), Picture(kSize * kSize));
         Pictures with = blank, without = blank;
         const auto draw = [&](Pictures& pictures) {
             for (std::size_t i = 0; i < frames.size(); ++i)
@@ -270,22 +261,15 @@ void count_effects(const std::string& path) {
                     ran[e] || (renderer->costs()[e].ran && renderer->costs()[e].can_be_left_out);
         }
         counted(embedded.name + "/all", frames.size(), [&] { draw(with); });
-        const double scanned = scanned_pixels(exercise->probe) * static_cast<double>(frames.size());
+        const double scanned = scanned_pixels(exercise->probe, kSize, kSize);
         for (std::size_t e = 0; e < ran.size(); ++e) {
             if (!ran[e]) continue;
             const char* name = renderer->costs()[e].name;
             renderer->leave_out(static_cast<int>(e));
             counted(embedded.name + "/" + name, frames.size(), [&] { draw(without); });
-            double changed = 0, squares = 0;
-            for (std::size_t i = 0; i < frames.size(); ++i) {
-                for (std::size_t p = 0; p < with[i].size(); ++p) {
-                    const int difference = with[i][p] - without[i][p];
-                    changed += difference != 0 ? 1 : 0;
-                    squares += difference * difference;
-                }
-            }
-            std::printf("%s %s %.6f %.4f\n", embedded.name.c_str(), name, changed / scanned,
-                        std::sqrt(squares / scanned));
+            const PictureChange change = change_of(with, without, scanned);
+            std::printf("%s %s %.6f %.4f\n", embedded.name.c_str(), name, change.part,
+                        change.rms_grey);
             std::fflush(stdout);
         }
     }

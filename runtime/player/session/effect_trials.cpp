@@ -18,8 +18,6 @@ double processor_ms() {
     return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
-using Picture = std::vector<std::uint8_t>;
-
 // Fastest frame of each input, in two halves of the turns.
 class Fastest {
   public:
@@ -44,26 +42,13 @@ class Fastest {
     std::vector<double> ms_;
 };
 
-std::size_t scanned_pixels(const Probe& probe, int width_px, int height_px) {
-    const ScanGeometry geometry = make_scan_geometry(probe, 2, 2, width_px, height_px);
-    std::size_t count = 0;
-    double line = 0, sample = 0;
-    for (int row = 0; row < height_px; ++row)
-        for (int column = 0; column < width_px; ++column)
-            count += geometry.locate(geometry.pixel_centre(column, row), line, sample) ? 1 : 0;
-    return count;
-}
-
 class Trial {
   public:
     Trial(Renderer& renderer,
           std::span<const FrameInput> inputs,
           std::size_t pixels,
-          std::size_t scanned)
-        : renderer_(renderer),
-          inputs_(inputs),
-          pixels_(pixels),
-          scanned_(static_cast<double>(std::max<std::size_t>(scanned, 1))) {}
+          double scanned)
+        : renderer_(renderer), inputs_(inputs), pixels_(pixels), scanned_(scanned) {}
 
     // Every input once, in order, so that the probe moves from frame to frame.
     void draw(int left_out, int turn, Fastest& fastest, std::vector<Picture>* keep) {
@@ -90,17 +75,9 @@ class Trial {
         trial.tried = true;
         trial.ms = on.both() - off.both();
         trial.noise_ms = std::abs((on.half(0) - off.half(0)) - (on.half(1) - off.half(1)));
-        double changed = 0, squares = 0;
-        for (std::size_t i = 0; i < with.size(); ++i) {
-            for (std::size_t p = 0; p < with[i].size(); ++p) {
-                const int difference = with[i][p] - without[i][p];
-                changed += difference != 0 ? 1 : 0;
-                squares += difference * difference;
-            }
-        }
-        const double all = scanned_ * static_cast<double>(with.size());
-        trial.changed_part = std::min(changed / all, 1.0);
-        trial.rms_grey = std::sqrt(squares / all);
+        const PictureChange change = change_of(with, without, scanned_);
+        trial.changed_part = change.part;
+        trial.rms_grey = change.rms_grey;
         frame_ms = std::min(frame_ms, on.both());
         return trial;
     }
@@ -113,6 +90,30 @@ class Trial {
 };
 
 }  // namespace
+
+double scanned_pixels(const Probe& probe, int width_px, int height_px) {
+    const ScanGeometry geometry = make_scan_geometry(probe, 2, 2, width_px, height_px);
+    double count = 0, line = 0, sample = 0;
+    for (int row = 0; row < height_px; ++row)
+        for (int column = 0; column < width_px; ++column)
+            count += geometry.locate(geometry.pixel_centre(column, row), line, sample) ? 1 : 0;
+    return std::max(count, 1.0);
+}
+
+PictureChange change_of(std::span<const Picture> with,
+                        std::span<const Picture> without,
+                        double scanned_pixels) {
+    double changed = 0, squares = 0;
+    for (std::size_t i = 0; i < with.size(); ++i) {
+        for (std::size_t p = 0; p < with[i].size(); ++p) {
+            const int difference = with[i][p] - without[i][p];
+            changed += difference != 0 ? 1 : 0;
+            squares += difference * difference;
+        }
+    }
+    const double all = scanned_pixels * static_cast<double>(with.size());
+    return {std::min(changed / all, 1.0), std::sqrt(squares / all)};
+}
 
 Result<EffectTrials> try_effects(CaseView bundle,
                                  const Exercise& exercise,

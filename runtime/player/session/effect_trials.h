@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -23,6 +24,20 @@ struct EffectTrial {
     double changed_part = 0;  // of the pixels that the probe scans, those with another grey
     double rms_grey = 0;      // root mean square of the change over all of them
 };
+
+using Picture = std::vector<std::uint8_t>;
+
+// Pixels of a picture that the probe scans, at least 1.
+double scanned_pixels(const Probe& probe, int width_px, int height_px);
+
+// How much pictures without an effect differ from those with it, over the scanned pixels of each:
+// the part with another grey, and the root mean square.
+struct PictureChange {
+    double part = 0, rms_grey = 0;
+};
+PictureChange change_of(std::span<const Picture> with,
+                        std::span<const Picture> without,
+                        double scanned_pixels);
 
 struct EffectTrials {
     int frames = 0;                    // that were drawn again

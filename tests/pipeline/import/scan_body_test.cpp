@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "formats/base/constants.h"
 #include "support/paths.h"
 
 namespace sonocase::pipeline {
@@ -78,7 +79,7 @@ TEST(ScanBody, what_organs_leave_is_filled_by_density_and_the_table_is_not) {
     for (const Measure& m : s.imported.report.measures)
         if (m.name == "scan_body_ml") ml = m.value;
     // The ellipse's area times the height; its edge is known to half a voxel: 2 of 70 mm.
-    EXPECT_NEAR(ml, 3.14159 * 100 * 70 * 60 / 1000, 0.06 * 1320);
+    EXPECT_NEAR(ml, kPi * 100 * 70 * 60 / 1000, 0.06 * 1320);
     for (const Label& label : labels.labels) EXPECT_NE(label.name, "other_bone");  // not used
 }
 
