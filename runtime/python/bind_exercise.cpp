@@ -9,16 +9,10 @@
 namespace sonocase::python {
 namespace {
 
-const char* shape_name(ProbeShape shape) {
-    return shape == ProbeShape::linear   ? "linear"
-           : shape == ProbeShape::phased ? "phased"
-                                         : "curvilinear";
-}
-
 ProbeShape shape_named(const std::string& name) {
     for (const ProbeShape shape :
          {ProbeShape::linear, ProbeShape::curvilinear, ProbeShape::phased}) {
-        if (name == shape_name(shape)) return shape;
+        if (name == probe_shape_name(shape)) return shape;
     }
     throw py::value_error("probe: no shape " + name + "; give linear, curvilinear or phased");
 }
@@ -40,7 +34,7 @@ void bind_probe(py::module_& module) {
              py::arg("focus_mm") = standard.focus_mm,
              py::arg("elevation_mm") = standard.elevation_mm)
         .def_property(
-            "shape", [](const Probe& p) { return shape_name(p.shape); },
+            "shape", [](const Probe& p) { return probe_shape_name(p.shape); },
             [](Probe& p, const std::string& name) { p.shape = shape_named(name); },
             "'linear', 'curvilinear' or 'phased'.")
         .def_readwrite("radius_mm", &Probe::radius_mm, "Of the face, curvilinear.")
@@ -53,7 +47,7 @@ void bind_probe(py::module_& module) {
         .def_readwrite("elevation_mm", &Probe::elevation_mm,
                        "Full thickness of the beam at the focus.")
         .def("__repr__", [](const Probe& p) {
-            return "<sonocase.Probe " + std::string(shape_name(p.shape)) + ", " +
+            return "<sonocase.Probe " + std::string(probe_shape_name(p.shape)) + ", " +
                    std::to_string(static_cast<int>(p.depth_mm)) + " mm deep>";
         });
 }

@@ -19,6 +19,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/base/constants.h"
 #include "formats/base/result.h"
 #include "formats/files/atomic_file.h"
 #include "formats/files/load_save.h"
@@ -137,7 +138,8 @@ Json record_of(const DatasetPlan& plan,
                const ChunkSetUp& set_up,
                std::uint64_t chunk,
                std::uint64_t frame,
-               const DrawnFrame& drawn) {
+               const DrawnFrame& drawn,
+               const Renderer::Layout& layout) {
     Json record = {{"index", frame}};
     if (plan.recipe.format == "png") {
         record["image"] = "frames/image_" + numbered(frame, 8) + ".png";
@@ -155,6 +157,17 @@ Json record_of(const DatasetPlan& plan,
     record["gain_db"] = drawn.input.settings.gain_db;
     record["noise_frame"] = drawn.input.frame;
     record["on_skin"] = drawn.on_skin;
+    // Millimetres of the plane (x along the face, z into the body) from pixels, and the probe.
+    record["mm_per_px"] = layout.mm_per_px;
+    record["origin_px"] = {layout.origin_x_px, layout.origin_y_px};
+    const Probe& probe = set_up.exercise.probe;
+    Json shape = {{"shape", probe_shape_name(probe.shape)}};
+    if (probe.shape != ProbeShape::curvilinear) shape["width_mm"] = probe.width_mm;
+    if (probe.shape == ProbeShape::curvilinear) shape["radius_mm"] = probe.radius_mm;
+    if (probe.shape != ProbeShape::linear)
+        shape["field_of_view_deg"] = probe.field_of_view_rad * kDegPerRad;
+    shape["frequency_mhz"] = probe.frequency_mhz;
+    record["probe"] = std::move(shape);
     return record;
 }
 
@@ -222,7 +235,8 @@ Status make_chunk(const DatasetPlan& plan, const DatasetSource& source, std::uin
         const FrameStatus status = engine.frame_again(again, pixels);
         if (Status read = bundle_health(*source.open); !read) return read;
         const FrameTruth& facts = truth.render(drawn.input, planes.planes());
-        std::string line = record_of(plan, source, set_up, chunk, frame, drawn).dump();
+        std::string line =
+            record_of(plan, source, set_up, chunk, frame, drawn, engine.renderer().layout()).dump();
         line.pop_back();
         records += line + ",\"truth\":" +
                    truth_json(facts, static_cast<int>(frame), status, source.open->bundle->labels,

@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads what `sonoplay dataset` wrote, for training, and writes it in forms that others read.
+
+    from sonocase.data import DataSet
+    data = DataSet("abdomen", split="train", planes=("labels", "needle"))
+    frame = data[0]                 # {"image": uint8 (height, width), "labels": ..., "needle": ...}
+    loader = torch.utils.data.DataLoader(data, batch_size=32, shuffle=True, num_workers=2)
+
+A DataSet has len() and [i], which is all that torch asks of a data set; torch itself is not needed.
+
+    python3 -m sonocase.data coco abdomen -o abdomen.json
+    python3 -m sonocase.data webdataset abdomen -o shards/abdomen-%06d.tar
+"""
+
+import argparse
+import io
+import json
+import pathlib
+import re
+import sys
+import tarfile
+
+import numpy as np
+
+from . import Error
+
+# Name in a frame, of the picture's file, and of the array's file.
+_PLANES = {"image": ("image", "images"), "labels": ("labels", "labels"),
+           "needle": ("needle", "needle"), "shadowed": ("shadow", "shadow"),
+           "skin_depth_mm": ("depth", "depth")}
+
+
+def _read(path):
+    if not path.exists():
+        raise Error(f"no such file: {path}: run sonoplay dataset again, it goes on where it stopped")
+    return path
+
+
+class DataSet:
+    """The frames of a data set, in the order of their numbers.
+
+    folder   that sonoplay dataset wrote
+    split    "train", "validate" or "test"; all by default
+    planes   what a frame holds beside "image": labels, needle, shadowed, skin_depth_mm
+    facts    also "facts": the line of manifest.jsonl, a dict that torch cannot stack
+    classes  names; by default those of all cases, "outside" first, the rest by the alphabet
+
+    "labels" of a frame are indices into `classes`, the same for all cases, whose own palettes
+    differ. A label that is not among the classes given becomes 0.
+    """
+
+    def __init__(self, folder, split=None, planes=("labels", "needle"), facts=False, classes=None):
+        self.folder = pathlib.Path(folder)
+        for plane in planes:
+            if plane not in _PLANES:
+                raise ValueError(f"unknown plane '{plane}': expected some of {', '.join(_PLANES)}")
+        self.description = json.loads(_read(self.folder / "dataset.json").read_text())
+        lines = _read(self.folder / "manifest.jsonl").read_text().splitlines()
+        self.records = [r for r in map(json.loads, lines) if split in (None, r["split"])]
+        self.planes = ("image", *[p for p in planes if p != "image"])
+        self.facts = facts
+        palettes = {c["bundle"]: [l["name"] for l in c["labels"]]
+                    for c in self.description["cases"]}
+        names = sorted({n for palette in palettes.values() for n in palette[1:]})
+        self.classes = ["outside", *names] if classes is None else list(classes)
+        index = {name: i for i, name in enumerate(self.classes)}
+        kind = np.uint8 if len(self.classes) <= 256 else np.uint16
+        self._class_of = {bundle: np.array([index.get(n, 0) for n in palette], kind)
+                          for bundle, palette in palettes.items()}
+        self._arrays = {}
+
+    def __len__(self):
+        return len(self.records)
+
+    def __iter__(self):
+        return map(self.__getitem__, range(len(self)))
+
+    def __getstate__(self):  # workers open their own files
+        return {**self.__dict__, "_arrays": {}}
+
+    def __getitem__(self, i):
+        record = self.records[i]
+        frame = {plane: self._plane(record, plane) for plane in self.planes}
+        if "labels" in frame:
+            frame["labels"] = self._class_of[record["case"]][frame["labels"]]
+        if self.facts:
+            frame["facts"] = record
+        return frame
+
+    def _plane(self, record, plane):
+        picture, array = _PLANES[plane]
+        if "image" in record:
+            from PIL import Image  # where it is missing, ask for format = "npy"
+
+            path = self.folder / "frames" / f"{picture}_{record['index']:08d}.png"
+            values = np.asarray(Image.open(_read(path)))
+            if plane == "skin_depth_mm":
+                values = np.where(values == 0, np.nan, values / 100).astype(np.float32)
+            return values
+        name = f"{array}_{record['chunk']:06d}.npy"
+        if name not in self._arrays:
+            self._arrays = {k: v for k, v in list(self._arrays.items())[-9:]}
+            self._arrays[name] = np.load(_read(self.folder / "arrays" / name), mmap_mode="r")
+        return np.array(self._arrays[name][record["row"]])
+
+
+def _runs(mask):
+    """Lengths of runs down the columns, of what is not in the mask first: COCO's counts."""
+    line = mask.T.ravel()
+    ends = np.flatnonzero(np.diff(line)) + 1
+    counts = np.diff(np.concatenate(([0], ends, [line.size]))).tolist()
+    return [0, *counts] if line[0] else counts
+
+
+def write_coco(data, path):
+    """Writes annotations in COCO's form: a mask of each class and of the needle in each picture.
+
+    Masks are run lengths (pycocotools reads them); file names are relative to the data set's folder.
+    """
+    if data.records and "image" not in data.records[0]:
+        raise Error(f"{data.folder}: COCO names picture files: ask for format = \"png\"")
+    categories = [{"id": i, "name": n} for i, n in enumerate(data.classes) if i > 0]
+    needle = len(data.classes)
+    categories.append({"id": needle, "name": "needle"})
+    images, annotations = [], []
+    whole = DataSet(data.folder, None, ("labels", "needle"), classes=data.classes)
+    whole.records = data.records
+    for record, frame in zip(data.records, whole):
+        height, width = frame["image"].shape
+        images.append({"id": record["index"], "file_name": record["image"], "width": width,
+                       "height": height, "mm_per_px": record.get("mm_per_px")})
+        masks = [(int(c), frame["labels"] == c) for c in np.unique(frame["labels"]) if c > 0]
+        masks.append((needle, frame["needle"] > 0))
+        for category, mask in masks:
+            rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+            if not rows.size:
+                continue
+            box = [int(columns[0]), int(rows[0]), int(columns[-1] - columns[0] + 1),
+                   int(rows[-1] - rows[0] + 1)]
+            annotations.append({"id": len(annotations) + 1, "image_id": record["index"],
+                                "category_id": category, "iscrowd": 0, "bbox": box,
+                                "area": int(mask.sum()),
+                                "segmentation": {"size": [height, width], "counts": _runs(mask)}})
+    path = pathlib.Path(path)
+    partial = path.with_name(path.name + ".part")
+    partial.write_text(json.dumps({"images": images, "annotations": annotations,
+                                   "categories": categories}))
+    partial.replace(path)
+
+
+def write_webdataset(data, pattern, frames_per_shard=1000):
+    """Writes tar files as WebDataset reads them: NNNNNNNN.image.npy, .labels.npy, ... and .json.
+
+    pattern   with one number, as in "abdomen-%06d.tar"; the same data give the same bytes
+    """
+    if not re.search(r"%0?\d*d", str(pattern)):
+        raise ValueError("pattern: expected a number in it, as in abdomen-%06d.tar")
+
+    def add(tar, name, content):
+        entry = tarfile.TarInfo(name)
+        entry.size = len(content)
+        tar.addfile(entry, io.BytesIO(content))
+
+    for shard, first in enumerate(range(0, len(data), frames_per_shard)):
+        path = pathlib.Path(str(pattern) % shard)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial = path.with_name(path.name + ".part")
+        with tarfile.open(partial, "w", format=tarfile.USTAR_FORMAT) as tar:
+            for i in range(first, min(first + frames_per_shard, len(data))):
+                record, frame = data.records[i], data[i]
+                key = f"{record['index']:08d}"
+                for plane in data.planes:
+                    content = io.BytesIO()
+                    np.save(content, frame[plane])
+                    add(tar, f"{key}.{plane}.npy", content.getvalue())
+                add(tar, f"{key}.json",
+                    json.dumps({**record, "classes": data.classes}).encode())
+        partial.replace(path)
+
+
+def main(arguments=None):
+    parser = argparse.ArgumentParser(prog="python3 -m sonocase.data", description=__doc__.split("\n")[0])
+    parser.add_argument("form", choices=["coco", "webdataset"])
+    parser.add_argument("folder", help="that sonoplay dataset wrote")
+    parser.add_argument("-o", "--out", required=True,
+                        help="coco: a .json file; webdataset: shards, as in abdomen-%%06d.tar")
+    parser.add_argument("--split", choices=["train", "validate", "test"])
+    parser.add_argument("--frames-per-shard", type=int, default=1000)
+    chosen = parser.parse_args(arguments)
+    try:
+        data = DataSet(chosen.folder, chosen.split, tuple(p for p in _PLANES if p != "image"))
+        if chosen.form == "coco":
+            write_coco(data, chosen.out)
+        else:
+            write_webdataset(data, chosen.out, max(1, chosen.frames_per_shard))
+    except (Error, ValueError, OSError, TypeError) as error:
+        print(f"sonocase.data: {error}", file=sys.stderr)
+        return 1
+    print(f"{len(data)} frames, {len(data.classes)} classes: {chosen.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
