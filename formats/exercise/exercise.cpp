@@ -275,6 +275,33 @@ std::vector<ExerciseTexts> read_texts(const TomlTable& table, const Exercise* ex
     return all;
 }
 
+void read_free_fluid(const TomlTable& table, FreeFluid& fluid) {
+    if (!table.number("ml", fluid.ml, 1, 20000) && !table.has("ml"))
+        table.add_fault("ml", "is missing", "expected a volume, as in ml = 2000");
+    table.number("ml_spread", fluid.ml_spread, 0, 0.9);
+    table.flag("blood", fluid.blood);
+    table.text("lies_in", fluid.lies_in);
+    if (fluid.lies_in.empty())
+        table.add_fault("lies_in", "is missing or empty",
+                        "expected the label of what lies between the bowels");
+    if (!table.point("centre", fluid.centre) && !table.has("centre"))
+        table.add_fault("centre", "is missing", "expected the middle of the abdomen");
+    Point3 half;
+    if (table.point("half_mm", half)) fluid.half_mm = half - Point3{};
+    for (int axis = 0; axis < 3; ++axis) {
+        if (fluid.half_mm[axis] >= 5 && fluid.half_mm[axis] <= 400) continue;
+        table.add_fault("half_mm", "is missing or out of range",
+                        "expected three lengths from 5 to 400 mm: across, front to back, head to "
+                        "foot");
+        break;
+    }
+    table.direction("up", fluid.up);
+    table.direction("head", fluid.head);
+    if (std::abs(dot(fluid.up, fluid.head)) > 0.7)
+        table.add_fault("head", "points almost along up", "expected it along the spine");
+    table.finish();
+}
+
 Exercise read_exercise(const TomlTable& root) {
     Exercise e;
     root.text("name", e.name);
@@ -323,8 +350,12 @@ Exercise read_exercise(const TomlTable& root) {
         table->number("vein_swell_mm", d.vein_swell_mm, 0, 2);
         table->finish();
     }
+    if (auto table = root.table("free_fluid")) read_free_fluid(*table, e.free_fluid);
     for (const TomlTable& table : root.tables("pass_marks")) read_pass_mark(table, e.pass_marks);
     e.procedure = read_procedure(root, e);
+    if (e.free_fluid.ml > 0 && !e.procedure.given())
+        root.add_fault("free_fluid", "stands alone",
+                       "expected [[steps]] or [[items]], which say what to do about it");
     if (auto table = root.table("texts")) read_texts(*table, &e);
     root.finish();
     return e;
@@ -400,6 +431,16 @@ double outer_radius_mm(const Target& lesion) {
         for (const LesionPart& part : kind->parts)
             if (part.place == PartPlace::shell) reach += part.size;
     return reach;
+}
+
+const char* probe_shape_name(ProbeShape shape) {
+    return shape_names()[static_cast<std::size_t>(shape)].c_str();
+}
+
+Matrix3 free_fluid_axes(const FreeFluid& fluid) {
+    const Vector3 up = normalized(fluid.up);
+    const Vector3 head = normalized(fluid.head - dot(fluid.head, up) * up);
+    return Matrix3::from_columns(cross(up, head), up, head);
 }
 
 double needle_diameter_mm(const NeedleModel& needle) {

@@ -18,6 +18,7 @@
 namespace sonocase {
 
 enum class ProbeShape { linear, curvilinear, phased };
+const char* probe_shape_name(ProbeShape shape);  // as files have it
 
 // Probe frame: origin at the middle of the probe face, x along the face towards the orientation
 // mark (lateral), y across it (elevation), z into the body (depth).
@@ -123,6 +124,21 @@ struct Deformation {
     double vein_level_mm = 0, vein_swell_mm = 0;
 };
 
+// Free fluid in the abdomen, which lies lowest. It takes the place of one tissue, that between the
+// bowels, within an ellipsoid and below a level; volume and posture say where the level is
+// (formats/scoring/free_fluid.h). Organs and bowel stay where they are.
+struct FreeFluid {
+    double ml = 0;         // 0: none
+    double ml_spread = 0;  // an attempt draws the volume from (1 -+ this) times ml
+    bool blood = false;    // fresh blood, with echoes; otherwise clear
+    std::string lies_in;   // label
+    Point3 centre;         // `mannequin` frame
+    Vector3 half_mm;       // of the ellipsoid: across, front to back, head to foot
+    // Of the patient on the back, with the table level: away from the ground, and to the head.
+    Vector3 up{0, 1, 0}, head{0, 0, 1};
+};
+inline constexpr const char* kFreeFluidName = "free_fluid";  // in conditions
+
 struct Exercise {
     std::string name;
     std::string title;  // shown to the trainee
@@ -146,6 +162,7 @@ struct Exercise {
     BreathingMotion breathing;
     Pulsation pulsation;
     Deformation deformation;
+    FreeFluid free_fluid;
     // Pass marks: metric name and limits, both inclusive; see docs/metrics.md.
     struct PassMark {
         std::string metric;
@@ -164,6 +181,9 @@ std::vector<Target> shown_lesions(const Exercise& exercise);
 
 // How far a lesion reaches from its centre, with the shells of its kind.
 double outer_radius_mm(const Target& lesion);
+
+// Axes of the ellipsoid of free fluid: across to the right, to the front, to the head.
+Matrix3 free_fluid_axes(const FreeFluid& fluid);
 
 double needle_diameter_mm(const NeedleModel& needle);  // as given, or by the gauge
 

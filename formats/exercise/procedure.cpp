@@ -37,7 +37,7 @@ Condition read_condition(const TomlTable& table, const Procedure& procedure, boo
     Condition c;
     c.given = true;
     table.texts("shows", c.shows, true);
-    if (table.number("shows_at_least", c.shows_at_least, 0.001, 1) && c.shows.empty())
+    if (table.number("shows_at_least", c.shows_at_least, 0.0002, 1) && c.shows.empty())
         table.add_fault("shows_at_least", "has no region", "expected shows = \"...\" beside it");
     table.texts("tip_in", c.tip_in, true);
     table.texts("tip_not_in", c.tip_not_in, true);
@@ -221,6 +221,7 @@ double Procedure::points() const {
 Procedure read_procedure(const TomlTable& root, const Exercise& exercise) {
     Procedure procedure;
     procedure.depth_mm = exercise.probe.depth_mm;
+    procedure.free_fluid = exercise.free_fluid.ml > 0;
     const auto head = root.table("procedure");
     if (head) {
         head->number("cut", procedure.cut, 0, 1e5);
@@ -244,6 +245,7 @@ Procedure read_procedure(const TomlTable& root, const Exercise& exercise) {
 std::string unknown_region(const Exercise& exercise, const std::vector<Label>& labels) {
     const auto known = [&](const std::string& region) {
         if (region == "body") return true;
+        if (region == kFreeFluidName && exercise.free_fluid.ml > 0) return true;
         for (const Target& target : exercise.targets)
             if (target.name == region) return true;
         for (const Finding& finding : exercise.findings)
@@ -264,6 +266,10 @@ std::string unknown_region(const Exercise& exercise, const std::vector<Label>& l
     for (const ProcedureItem& item : exercise.procedure.items)
         if (const std::string region = first(item.condition); !region.empty()) return region;
     return {};
+}
+
+namespace {
+constexpr double kDrainMl = 5, kDrainBagMl = 250;  // of a collection; of the abdomen
 }
 
 std::vector<TrayAct> procedure_tray(const Procedure& procedure) {
@@ -291,17 +297,23 @@ std::vector<TrayAct> procedure_tray(const Procedure& procedure) {
                                    {{ActKind::dilate, 0, 1}, "Dilator"},
                                    {{ActKind::catheter, 0, 1}, "Catheter in"},
                                    {{ActKind::catheter, 0, 0}, "Catheter out"},
-                                   {{ActKind::drain, 0, 5}, "Drain 5 ml"},
+                                   {{ActKind::drain, 0, kDrainMl}, "Drain 5 ml"},
+                                   {{ActKind::drain, 0, kDrainBagMl}, "Drain 250 ml"},
                                    {{ActKind::compress, 0, 1}, "Press on it"},
                                    {{ActKind::compress, 0, 0}, "Let go"},
                                    {{ActKind::rescan, 0, 1}, "I looked again"},
                                    {{ActKind::tilt, 0, 15}, "Head down 15 degrees"},
                                    {{ActKind::tilt, 0, 0}, "Table level"},
                                    {{ActKind::valsalva, 0, 1}, "Ask to strain"},
-                                   {{ActKind::valsalva, 0, 0}, "Breathe again"}};
+                                   {{ActKind::valsalva, 0, 0}, "Breathe again"},
+                                   {{ActKind::turn, 0, 30}, "Turn to the left"},
+                                   {{ActKind::turn, 0, 0}, "On the back again"}};
     std::vector<TrayAct> tray;
-    for (const TrayAct& one : kAll)
+    const double other_drain_ml = procedure.free_fluid ? kDrainMl : kDrainBagMl;
+    for (const TrayAct& one : kAll) {
+        if (one.act.kind == ActKind::drain && one.act.amount == other_drain_ml) continue;
         if (asked[static_cast<std::size_t>(one.act.kind)]) tray.push_back(one);
+    }
     return tray;
 }
 

@@ -83,8 +83,9 @@ struct Procedure {
     // Injections, throws, wires, dilators and catheters that no step asks for where they are done;
     // more of them fail. Whoever tries everything everywhere must not come upon the right place.
     int stray_acts_at_most = 3;
-    std::string source;     // of the list as a whole
-    double depth_mm = 150;  // to which a picture counts as seen: the probe's, as written
+    std::string source;       // of the list as a whole
+    double depth_mm = 150;    // to which a picture counts as seen: the probe's, as written
+    bool free_fluid = false;  // the exercise has some, which is drained by the bag
     bool given() const { return !steps.empty() || !items.empty(); }
     double points() const;  // sum of the items' weights
 };
@@ -106,6 +107,11 @@ struct SceneChange {
     // Radius of the first targets over that as drawn: they shrink as they are drained.
     std::array<double, kMaxTargets> target_scale{1, 1, 1, 1, 1, 1, 1, 1};
     Line wire, catheter;
+    // The surface of free fluid: its normal, away from the ground, and its height above the
+    // fluid's centre. Without `has_level` it lies as the exercise has it.
+    bool has_level = false;
+    Vector3 level_up{0, 1, 0};
+    double level_mm = 0;
     // How full the veins are: outward shift of their walls, and the pressure in them; 0: that of
     // the exercise.
     double vein_wall_mm = 0, venous_pressure_mmhg = 0;

@@ -105,6 +105,8 @@ const Tissue kKidneyStone{"kidney_stone",
                           6.0,
                           3400,
                           "PMC5695736: on average as bright as sinus fat; attenuation (a)"};
+// A vessel is of the tissue that labels of vessels have, which every case has.
+const Tissue kBlood{"blood", kFluid, false, "fluid", 15, 5, -30, 0, 0.15, 1.61, 1570, "as blood"};
 const Tissue kUrine{"hydronephrosis", kFluid, false, "fluid", 6, 3, -60, 0, 0.01, 1.52, 1500,
                     "as urine"};
 const Tissue kAscites{"ascites", kFluid, false, "fluid", 8, 3, -58, 0, 0.01, 1.52, 1510, "as cyst"};
@@ -307,6 +309,15 @@ std::vector<PathologyKind> make_kinds() {
          kCatheterLumen,
          {{"wall", shell, 0.7, kCatheterWall}},
          "two bright lines"},
+        {"vessel",
+         tube,
+         false,
+         1,
+         0,
+         1,
+         kBlood,
+         {},
+         "an artery or a vein that the map lacks, by its name"},
         {"foreign_body", tube, false, 1, 0, 1, kForeignBody, {}, "bright line with a shadow"},
     };
 }

@@ -10,9 +10,9 @@
 namespace sonocase {
 
 const std::vector<std::string>& act_names() {
-    static const std::vector<std::string> names{"inject", "aspirate", "core_throw", "wire",
-                                                "dilate", "catheter", "drain",      "compress",
-                                                "rescan", "answer",   "tilt",       "valsalva"};
+    static const std::vector<std::string> names{
+        "inject",   "aspirate", "core_throw", "wire", "dilate",   "catheter", "drain",
+        "compress", "rescan",   "answer",     "tilt", "valsalva", "turn"};
     return names;
 }
 

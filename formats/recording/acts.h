@@ -26,8 +26,9 @@ enum class ActKind : std::uint8_t {
     answer,      // index: item; amount: the option chosen, from 0
     tilt,        // the table: degrees head down; 0: level
     valsalva,    // 1: the patient strains against closed lips; 0: breathes again
+    turn,        // the patient: degrees onto the left side; negative: right; 0: on the back
 };
-inline constexpr int kActKinds = 12;
+inline constexpr int kActKinds = 13;
 const std::vector<std::string>& act_names();  // in the order of the enumeration
 
 struct Act {

@@ -68,6 +68,7 @@ constexpr double kOpenMm = 40;         // depth to which the picture at the star
 constexpr double kLineGapMm = 6;       // between lines that are tried for it
 constexpr double kApartMm = 2;         // gap between a finding and other findings or targets
 constexpr std::uint64_t kLesionStream = 0x6A09E667F3BCC909ull;  // fractional part of the root of 2
+constexpr std::uint64_t kFluidStream = 0xBB67AE8584CAA73Bull;   // of the root of 3
 constexpr double kMinCosine = 0.17364817766693041;              // of 80 degrees
 constexpr double kMaxCosine = 0.93969262078590843;              // of 20 degrees
 
@@ -331,6 +332,8 @@ AttemptDraw draw_attempt(const Exercise& exercise,
         }
     }
     place_findings(out, anatomy, labels, lesion_draws);
+    FreeFluid& fluid = out.exercise.free_fluid;
+    fluid.ml *= 1 + fluid.ml_spread * RandomStream(seed ^ kFluidStream).uniform(-1, 1);
     if (out.exercise.start_spread_mm > 0 && !draw_start(out.exercise, anatomy, draws)) {
         out.warnings.push_back(
             "No place away from the target was found for the probe, so it "

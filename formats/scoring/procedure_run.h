@@ -31,6 +31,7 @@
 //               any
 //   tilt        head down by degrees: veins of the neck fill (formats/exercise/motion.h)
 //   valsalva    the patient strains: they fill more
+//   turn        onto the left side by degrees; free fluid runs to where is lowest now, as with tilt
 //   compress    counts the seconds; bleeding stops after 30 s of it
 // Bleeding gives 0.2 ml/s into a pool, at most 60 ml.
 #pragma once
@@ -46,6 +47,7 @@
 #include "formats/exercise/exercise.h"
 #include "formats/recording/session.h"
 #include "formats/scoring/anatomy.h"
+#include "formats/scoring/free_fluid.h"
 #include "formats/scoring/sight.h"
 
 namespace sonocase {
@@ -114,6 +116,7 @@ struct ProcedureState {
     bool compressing = false;
     double head_down_deg = 0;  // of the table
     bool strains = false;      // against closed lips
+    double turned_deg = 0;     // of the patient, onto the left side
     int bleeding_pool = -1;
 };
 
@@ -174,7 +177,7 @@ class ProcedureRun {
 
     // Takes the next sample: probe, drawn needle, press and acts. Allocates nothing. Cost: nothing
     // without a procedure; otherwise one walk along the needle and, while a step or item waits for
-    // a region in the picture, 300 look-ups.
+    // a region in the picture, 520 look-ups, or 3,120 where one is small.
     void update(double time_s,
                 bool probe_ok,
                 const Rigid& mannequin_from_probe,
@@ -198,6 +201,7 @@ class ProcedureRun {
 
     SceneChange scene() const;
     double volume_ml(int target) const;  // what a collection still holds
+    double free_fluid_ml() const { return fluid_region_ < 0 ? 0 : left_ml_[fluid_region()]; }
     // `ended`: what waits still is missed.
     ProcedureResult result() const;
     std::vector<ProcedureResult::Taken> taken() const;  // by the last throw
@@ -236,6 +240,9 @@ class ProcedureRun {
     void core_throw(double mm, const Facts& facts);
     void bleed(Point3 rest, double time_s);
     Point3 wire_end(const Facts& facts, double mm) const;
+    std::size_t fluid_region() const { return static_cast<std::size_t>(fluid_region_); }
+    bool contains(std::size_t region, Point3 rest, int label) const;
+    void settle_fluid();
     int collection(const Facts& facts) const;
     void happened(ComplicationKind kind, double time_s);
     void watch_needle(const Facts& facts);
@@ -247,10 +254,16 @@ class ProcedureRun {
     std::shared_ptr<const Anatomy> anatomy_;
     NeedleSight sight_;
     Probe probe_;
-    bool has_items_ = false, needs_look_ = false;
+    bool has_items_ = false, looks_closely_ = false;
     std::vector<Watch> entry_, done_, item_;
     std::vector<int> rank_;
-    std::vector<Target> regions_;  // targets, then findings
+    std::vector<Target> regions_;  // targets, findings, free fluid
+    int fluid_region_ = -1;
+    std::optional<FreeFluidPlace> fluid_;
+    Vector3 fluid_up_{0, 1, 0};
+    double fluid_level_mm_ = 0;
+    double settled_ml_ = -1, settled_turn_deg_ = 0, settled_tilt_deg_ = 0;
+    int fluid_seen_ = 0;  // looked-up points in it
     enum Kind : std::uint8_t { kSoft, kLung, kArtery, kVein, kBowel, kBile, kUrine, kBone, kGas };
     std::array<Kind, 256> kind_{};
     std::vector<double> left_ml_, full_ml_;  // of regions_ that hold fluid

@@ -153,7 +153,7 @@ std::vector<Tissue> pathology_tissues(std::span<const PathologyRequest> requests
     for (const PathologyRequest& request : requests) {
         const PathologyKind* kind = find_pathology_kind(request.kind);
         if (kind == nullptr) continue;
-        if (request.tissue.empty()) add(kind->tissue);
+        if (request.tissue.empty() && kind->tissue.name != "blood") add(kind->tissue);
         for (const LesionPart& part : kind->parts)
             if (part_size(request, part) > 0) add(part.tissue);
     }

@@ -6,7 +6,9 @@
 #include <cmath>
 
 #include "formats/exercise/exercise.h"
+#include "formats/scoring/free_fluid.h"
 #include "formats/text/nearest_name.h"
+#include "formats/text/number_text.h"
 #include "pipeline/pictures/preview_picture.h"
 #include "pipeline/stages/exercise_frame.h"
 
@@ -69,6 +71,30 @@ std::vector<std::string> region_names(const Exercise& exercise, const LabelVolum
 long line_of(const std::string& toml, const std::string& name) {
     const std::size_t at = std::min(toml.find('"' + name + '"'), toml.size());
     return 1 + std::count(toml.begin(), toml.begin() + static_cast<std::ptrdiff_t>(at), '\n');
+}
+
+Status check_free_fluid(const Exercise& exercise,
+                        const LabelVolume& volume,
+                        const std::string& name,
+                        const std::string& toml) {
+    const FreeFluid& fluid = exercise.free_fluid;
+    if (!(fluid.ml > 0)) return Done{};
+    const std::string where = name + ".toml:" + std::to_string(line_of(toml, fluid.lies_in));
+    const FreeFluidPlace place(
+        fluid, [&](Point3 p) { return label_at(volume, p); }, volume.labels);
+    if (place.label() < 0) {
+        std::vector<std::string> names;
+        for (std::size_t l = 1; l < volume.labels.size(); ++l)
+            names.push_back(volume.labels[l].name);
+        return Error{"free fluid lies in '" + fluid.lies_in + "', which the case lacks", where,
+                     suggest_name(fluid.lies_in, names)};
+    }
+    const double most_ml = fluid.ml * (1 + fluid.ml_spread);
+    if (most_ml > place.capacity_ml())
+        return Error{number_text(most_ml, 4) + " ml of free fluid do not fit", where,
+                     "'" + fluid.lies_in + "' has " + number_text(place.capacity_ml(), 4) +
+                         " ml there: lower ml, or raise half_mm"};
+    return Done{};
 }
 
 // Rounds to 1/4096 mm, and normals to as many digits: finer than any use of a skin needs, and the
@@ -154,6 +180,7 @@ Result<PackResult> pack_case(const PackInput& input) {
             return Error{"the procedure names a region '" + region + "' that the case lacks",
                          embedded.name + ".toml:" + std::to_string(line_of(written, region)),
                          suggest_name(region, region_names(exercise, volume))};
+        SONOCASE_TRY_DONE(check_free_fluid(exercise, volume, embedded.name, written));
         check_exercise(exercise, volume, &report.warnings);
     }
     const auto voxels = static_cast<double>(volume.grid.voxel_count());

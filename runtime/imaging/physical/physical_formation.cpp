@@ -176,11 +176,12 @@ Result<std::unique_ptr<ImageFormation>> create(const FormationInput& input) {
     jobs.run(2, [&](std::size_t job) {
         if (job == 0) {  // the longer one, on the caller's thread, whose memory it keeps
             const Machine machine = machine_of(input);
-            scene = make_physical_scene(
-                input.bundle, shown_lesions(input.exercise),
-                {&jobs, textures, machine.tissue_db, machine.structures,
-                 physical::shows_fine(machine, input.exercise.probe),
-                 machine.speckle_reduction.variation > 0, input.exercise.procedure.given()});
+            scene =
+                make_physical_scene(input.bundle, shown_lesions(input.exercise),
+                                    {&jobs, textures, machine.tissue_db, machine.structures,
+                                     physical::shows_fine(machine, input.exercise.probe),
+                                     machine.speckle_reduction.variation > 0,
+                                     input.exercise.procedure.given(), input.exercise.free_fluid});
         } else {
             noise = make_physical_noise(textures->normal_levels, input.options.seed,
                                         input.scanlines + kNoiseSlack);

@@ -42,15 +42,6 @@ std::string line(const char* format, double a, double b = 0, double c = 0) {
     return words;
 }
 
-const char* shape_key(ProbeShape shape) {
-    switch (shape) {
-        case ProbeShape::linear: return "linear";
-        case ProbeShape::curvilinear: return "curvilinear";
-        case ProbeShape::phased: return "phased";
-    }
-    return "";
-}
-
 }  // namespace
 
 std::string exercise_name(const std::string& title) {
@@ -87,7 +78,7 @@ std::string exercise_toml(const Exercise& base,
             out += (i ? ", " : "") + quoted(base.no_go[i]);
         out += "]\n";
     }
-    out += std::string("\n[probe]\nshape = \"") + shape_key(probe.shape) + "\"\n";
+    out += std::string("\n[probe]\nshape = \"") + probe_shape_name(probe.shape) + "\"\n";
     if (probe.shape == ProbeShape::curvilinear) out += line("radius_mm = %.4g\n", probe.radius_mm);
     if (probe.shape != ProbeShape::linear)
         out += line("field_of_view_deg = %.6g\n", probe.field_of_view_rad * kDegPerRad);

@@ -138,5 +138,36 @@ TEST(Acts, WhatCannotBeReadIsLeftOutAndNamed) {
     EXPECT_EQ(acts_of("drain=1;drain=1;drain=1;drain=1;drain=1").count, ActList::kMaxActs);
 }
 
+TEST(ReadProcedure, FreeFluidIsReadAndRefusedWhereItMakesNoSense) {
+    const std::string look = kLook;
+    const std::string fluid =
+        "[free_fluid]\nml = 900\nlies_in = \"fat\"\ncentre = [1, 2, 3]\nhalf_mm = [120, 60, 90]\n";
+    const auto exercise = parse_exercise(kHead + look + fluid, "x.toml");
+    ASSERT_TRUE(exercise) << exercise.error().message();
+    EXPECT_EQ(exercise->free_fluid.ml, 900);
+    EXPECT_EQ(exercise->free_fluid.half_mm.y, 60);
+    EXPECT_EQ(parse_exercise(kHead + look, "x.toml")->free_fluid.ml, 0);
+    expect_fault(fluid, 2, "stands alone");
+    expect_fault(look + "[free_fluid]\nlies_in = \"fat\"\n", 5, "free_fluid.ml is missing");
+    expect_fault(look + "[free_fluid]\nml = 900\n", 5, "free_fluid.lies_in is missing");
+    expect_fault(look + "[free_fluid]\nml = 900\nlies_in = \"fat\"\ncentre = [0, 0, 0]\n", 5,
+                 "three lengths");
+    expect_fault(look + fluid + "up = [0, 0, 1]\n", 5, "almost along up");
+    expect_fault(look + fluid + "level_mm = 3\n", 10, "level_mm");
+    // Only where there is some is it a region, and bags are emptied, not syringes.
+    Label fat;
+    fat.name = "fat";
+    const std::string drain =
+        "[[steps]]\nname = \"run\"\ndone = { act = \"drain\", tip_in = \"free_fluid\" }\n";
+    EXPECT_EQ(unknown_region(*parse_exercise(kHead + drain, "x.toml"), {Label{}, fat}),
+              "free_fluid");
+    EXPECT_EQ(unknown_region(*parse_exercise(kHead + drain + fluid, "x.toml"), {Label{}, fat}), "");
+    const auto portion = [&](const std::string& lines) {
+        return procedure_tray(parse_exercise(kHead + lines, "x.toml")->procedure).at(0).act.amount;
+    };
+    EXPECT_EQ(portion(drain), 5);
+    EXPECT_EQ(portion(drain + fluid), 250);
+}
+
 }  // namespace
 }  // namespace sonocase

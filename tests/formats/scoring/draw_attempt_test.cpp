@@ -166,6 +166,26 @@ TEST(DrawAttempt, AnOrganThatTheCaseLacksIsSaid) {
     EXPECT_NE(drawn.warnings[0].find("lesion"), std::string::npos);
 }
 
+TEST(DrawAttempt, FreeFluidIsDrawnAnewAndChangesNothingElse) {
+    Exercise plain = exercise(), wet = plain;
+    wet.free_fluid.ml = 1000;
+    wet.free_fluid.ml_spread = 0.3;
+    double least = 1e9, most = 0;
+    for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+        const AttemptDraw a = draw_attempt(plain, WindowedBall(-2), kLabels, seed),
+                          b = draw_attempt(wet, WindowedBall(-2), kLabels, seed);
+        EXPECT_EQ(a.exercise.free_fluid.ml, 0);
+        EXPECT_EQ(distance(a.exercise.targets[0].centre, b.exercise.targets[0].centre), 0);
+        least = std::min(least, b.exercise.free_fluid.ml);
+        most = std::max(most, b.exercise.free_fluid.ml);
+    }
+    EXPECT_GE(least, 700);
+    EXPECT_LT(least, 760);  // 40 draws leave out a tenth of the range once in 70 times
+    EXPECT_LE(most, 1300);
+    EXPECT_GT(most, 1240);
+    EXPECT_EQ(draw_attempt(wet, WindowedBall(-2), kLabels, 0).exercise.free_fluid.ml, 1000);
+}
+
 TEST(AttemptSeed, IsReadFromTheHeaderAndIsZeroWhereThereIsNone) {
     SessionHeader header;
     EXPECT_EQ(attempt_seed(header), 0u);

@@ -3,7 +3,9 @@
 // The analytic bodies as anatomy for scores, in the frame `ct` and without cooking them.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <iterator>
 #include <optional>
 #include <vector>
 
@@ -15,7 +17,13 @@ namespace sonocase::testing {
 
 class AnalyticAnatomy final : public Anatomy {
   public:
-    AnalyticAnatomy() : labels_(pipeline::analytic_torso_labels()) {}
+    // The torso with the artery that the recipe of scenarios/procedures adds to it.
+    AnalyticAnatomy() : labels_(pipeline::analytic_torso_labels()) {
+        Label artery;
+        artery.name = "inferior_epigastric_artery_left";
+        artery.tissue = "blood";
+        labels_.push_back(artery);
+    }
     // The neck of a seed; its axial sections are kept a quarter of a millimetre apart.
     explicit AnalyticAnatomy(int neck_seed)
         : labels_(pipeline::NeckAnatomy::labels()),
@@ -26,7 +34,9 @@ class AnalyticAnatomy final : public Anatomy {
     const std::vector<Label>& labels() const { return labels_; }
     bool inside(Point3 p) const override { return label(p) != 0; }
     int label(Point3 p) const override {
-        if (!neck_) return pipeline::analytic_torso_label(p);
+        if (!neck_)
+            return in_artery(p) ? static_cast<int>(labels_.size()) - 1
+                                : pipeline::analytic_torso_label(p);
         const double k = (p.z - kLowMm) / kSectionMm + 0.5;
         if (!(k >= 0) || k >= static_cast<double>(sections_.size())) return neck_->label(p);
         return neck_->label(sections_[static_cast<std::size_t>(k)], p.x, p.y);
@@ -44,6 +54,19 @@ class AnalyticAnatomy final : public Anatomy {
     }
 
   private:
+    static bool in_artery(Point3 p) {
+        static constexpr double kPath[][3] = {{-66, 72.4, -150}, {-62, 75.2, -130},
+                                              {-56, 80.4, -105}, {-50, 86.7, -80},
+                                              {-46, 91.8, -50},  {-44, 91.2, -20}};
+        if (p.x < -70 || p.x > -40 || p.y < 68) return false;
+        for (std::size_t i = 0; i + 1 < std::size(kPath); ++i) {
+            const Point3 a{kPath[i][0], kPath[i][1], kPath[i][2]};
+            const Vector3 along = Point3{kPath[i + 1][0], kPath[i + 1][1], kPath[i + 1][2]} - a;
+            const double t = std::clamp(dot(p - a, along) / dot(along, along), 0.0, 1.0);
+            if (distance(p, a + t * along) < 1.5) return true;
+        }
+        return false;
+    }
     static constexpr double kLowMm = -100, kHighMm = 80, kSectionMm = 0.25;
     std::vector<Label> labels_;
     std::optional<pipeline::NeckAnatomy> neck_;

@@ -47,9 +47,9 @@ Exercise procedure_called(const std::string& name) {
 }
 
 const std::vector<std::string>& procedures() {
-    static const std::vector<std::string> names{"liver-biopsy",  "renal-biopsy", "abscess-drainage",
-                                                "nephrostomy",   "fast",         "central-line",
-                                                "first-picture", "planes",       "jugular-across"};
+    static const std::vector<std::string> names{
+        "liver-biopsy", "renal-biopsy",  "abscess-drainage", "nephrostomy",    "fast",
+        "central-line", "first-picture", "planes",           "jugular-across", "paracentesis"};
     return names;
 }
 
@@ -514,6 +514,36 @@ TEST(Procedures, AnInjectionIntoBoneIsLostAndOneUnderItIsKept) {
     ASSERT_EQ(state.pool_count, 1);
     const SceneChange::Pool pool = held.machine().scene().pools[0];
     EXPECT_NEAR(4.0 / 3 * kPi * std::pow(pool.radius_mm, 3) / 1000, 3, 1e-9);
+}
+
+TEST(Procedures, FreeFluidRunsToWhereIsLowestAndLeavesWithTheDrain) {
+    Held held("paracentesis");
+    const FreeFluid& fluid = held.exercise().free_fluid;
+    const Point3 left{-95, 50, -92}, right{95, 50, -92};  // in fat, high in the flanks
+    const Vector3 way{0.953, -0.303, 0};
+    const auto tip_gives = [&](Point3 tip, const char* acts) {
+        held.at(tip, way, acts);
+        held.at(tip, way, "aspirate=1");
+        return held.drawn();
+    };
+    EXPECT_EQ(tip_gives(left, ""), "nothing");
+    EXPECT_EQ(tip_gives(left, "turn=30"), "fluid");
+    EXPECT_EQ(tip_gives(right, ""), "nothing");
+    EXPECT_EQ(tip_gives(right, "turn=-30"), "fluid");
+    EXPECT_EQ(tip_gives(left, ""), "nothing");
+    EXPECT_EQ(tip_gives(left, "turn=30"), "fluid");
+    held.at(left, way, "catheter=1");
+    EXPECT_EQ(held.machine().state().turned_deg, 30);
+    const double before_mm = held.machine().scene().level_mm;
+    held.at(left, way, "drain=250");
+    EXPECT_LT(held.machine().scene().level_mm, before_mm - 3);
+    for (int i = 0; i < 8; ++i) held.at(left, way, "drain=250");
+    EXPECT_EQ(held.machine().free_fluid_ml(), 0);
+    EXPECT_NEAR(held.machine().state().drained_ml + held.machine().state().aspirated_ml, fluid.ml,
+                1e-9);
+    EXPECT_EQ(tip_gives(left, ""), "nothing");
+    held.at(left, way, "turn=400;tilt=-400");
+    EXPECT_EQ(held.machine().state().turned_deg, 90);
 }
 
 }  // namespace

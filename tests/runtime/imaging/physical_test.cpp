@@ -79,6 +79,51 @@ TEST(PhysicalModel, LesionsOfAKindAgreeWithTheSlowRenderer) {
     EXPECT_GT(compare(fast, plain).mean, 0.2);  // five lesions in one picture
 }
 
+// What acts have put into the tissue, and free fluid below a slanting level among the ribs.
+TEST(PhysicalModel, WhatActsPutIntoTheTissueAgreesWithTheSlowRenderer) {
+    Exercise exercise = phantom_exercise();
+    exercise.procedure.items.emplace_back();
+    exercise.free_fluid.ml = 100;
+    exercise.free_fluid.lies_in = "liver";
+    exercise.free_fluid.centre = {5, 0, 70};
+    exercise.free_fluid.half_mm = {40, 30, 25};
+    FrameInput input;
+    const auto plain = draw(exercise, physical_options(), input);
+    SceneChange& change = input.change;
+    change.has_level = true;
+    change.level_up = normalized(Vector3{0.3, 0.1, -1});
+    change.level_mm = 4;
+    const auto fluid = draw(exercise, physical_options(), input);
+    change.pool_count = 2;
+    change.pools[0] = {{-25, 1, 35}, 5, false};
+    change.pools[1] = {{30, 0, 40}, 7, true};
+    change.wire = {true, {-30, 0, 5}, {-5, 0, 60}, {10, 1, 80}};
+    change.catheter = {true, {25, 0, 5}, {15, 0, 50}, {15, 0, 75}};
+    const auto all = draw(exercise, physical_options(), input);
+    const Difference d =
+        compare(all, draw(exercise, physical_options(RendererKind::reference), input));
+    std::printf("acts mean %.3f bias %+.3f worst %d\n", d.mean, d.bias, d.worst);
+    EXPECT_LT(d.mean, 0.35);
+    EXPECT_LT(std::abs(d.bias), 0.1);
+    EXPECT_GT(compare(fluid, plain).mean, 1);
+    EXPECT_GT(compare(all, fluid).mean, 0.2);
+    // Below the level it is black, above it and in other tissue nothing has changed.
+    auto renderer = Renderer::create(phantom(), exercise, physical_options());
+    ASSERT_TRUE(renderer.has_value());
+    const auto layout = renderer->layout();
+    const auto mean_about = [&](const std::vector<std::uint8_t>& picture, double x, double z) {
+        const int column = static_cast<int>(std::lround(layout.origin_x_px + x / layout.mm_per_px)),
+                  row = static_cast<int>(std::lround(layout.origin_y_px + z / layout.mm_per_px));
+        double sum = 0;
+        for (int r = -2; r <= 2; ++r)
+            for (int c = -2; c <= 2; ++c)
+                sum += picture[static_cast<std::size_t>((row + r) * 256 + column + c)];
+        return sum / 25;
+    };
+    EXPECT_LT(mean_about(fluid, -10, 75), 0.5 * mean_about(plain, -10, 75));
+    EXPECT_EQ(mean_about(fluid, 5, 35), mean_about(plain, 5, 35));
+}
+
 // The fast renderer works out the breathing weight on a coarse lattice. Where it is a hundredth
 // off, 8 mm of breathing shift the tissue by a quarter of a scatterer: one grain in four differs.
 TEST(PhysicalModel, AgreesWithTheSlowRendererWhileBreathing) {

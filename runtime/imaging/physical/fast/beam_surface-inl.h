@@ -285,6 +285,18 @@ HWY_INLINE void target_row(
     auto distance = about.distance_mm;
     const auto reached = hn::Le(distance, reach);
     const auto own = hn::Load(di, c.label.row(row));
+    if (ball.only_label >= 0) {
+        const auto height = hn::MulAdd(fx, hn::Set(d, ball.level_up[0]),
+                                       hn::MulAdd(fy, hn::Set(d, ball.level_up[1]),
+                                                  hn::Mul(fz, hn::Set(d, ball.level_up[2]))));
+        const auto wet = hn::And(hn::Lt(distance, zero), hn::Lt(height, hn::Set(d, ball.level_mm)));
+        const auto within =
+            hn::And(hn::RebindMask(di, wet), hn::Eq(own, hn::Set(di, ball.only_label)));
+        if (hn::AllFalse(di, within)) return;
+        met = true;
+        hn::Store(hn::IfThenElse(within, hn::Set(di, ball.acoustics), own), di, c.label.row(row));
+        return;
+    }
     const auto kind =
         hn::And(hn::ShiftRight<16>(hn::GatherIndex(di, b.acoustics, own)), hn::Set(di, 7));
     // A ball replaces soft tissue, and also an earlier ball, which lies in soft tissue.

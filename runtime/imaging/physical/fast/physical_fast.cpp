@@ -109,7 +109,11 @@ PhysicalTarget packed(const TargetBall& t) {
             .acoustics = t.acoustics,
             .wall = static_cast<float>(t.wall),
             .fluid = t.fluid,
-            .anywhere = t.anywhere};
+            .anywhere = t.anywhere,
+            .only_label = t.only_label,
+            .level_up = {static_cast<float>(t.level_up.x), static_cast<float>(t.level_up.y),
+                         static_cast<float>(t.level_up.z)},
+            .level_mm = static_cast<float>(t.level_mm)};
 }
 
 }  // namespace

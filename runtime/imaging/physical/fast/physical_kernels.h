@@ -85,6 +85,10 @@ struct PhysicalTarget {
     float wall = 0;
     bool fluid = false;
     bool anywhere = false;  // shows in fluid as well
+    // Free fluid (TargetBall): the label that it takes the place of, -1: no free fluid; a plane.
+    std::int32_t only_label = -1;
+    float level_up[3] = {};
+    float level_mm = 0;
 };
 
 // The part of physical::SpeckleSide that is not worked out per beam.

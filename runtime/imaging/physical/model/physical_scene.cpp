@@ -198,6 +198,27 @@ void add_act_tissues(PhysicalScene& s) {
     s.catheter = add({-30, 0.3, TissueKind::fluid});
 }
 
+void add_free_fluid(const FreeFluid& fluid, PhysicalScene& s) {
+    if (!(fluid.ml > 0) || s.clear_pool < 0) return;
+    for (std::size_t l = 1; l < s.bundle->labels.size(); ++l) {
+        if (s.bundle->labels[l].name != fluid.lies_in) continue;
+        TargetBall ball;
+        ball.centre_vx = s.grid.voxel_from_point(fluid.centre);
+        const Vector3 h = fluid.half_mm;
+        ball.radius_mm = std::cbrt(h.x * h.y * h.z);
+        ball.reach_mm = std::max({h.x, h.y, h.z});
+        ball.round = false;
+        const Matrix3 axes = free_fluid_axes(fluid);
+        const auto square = [&](double half) { return std::pow(ball.radius_mm / half, 2); };
+        ball.shape =
+            axes * Matrix3::diagonal({square(h.x), square(h.y), square(h.z)}) * transpose(axes);
+        ball.acoustics = fluid.blood ? s.blood_pool : s.clear_pool;
+        ball.fluid = true;
+        ball.only_label = static_cast<int>(l);
+        s.free_fluid = ball;
+    }
+}
+
 // Adds the acoustic properties of labels and targets, and the echoes between labels.
 void add_tissues(const CaseBundle& bundle,
                  const std::vector<Target>& targets,
@@ -232,6 +253,7 @@ void add_tissues(const CaseBundle& bundle,
     }
     add_targets(targets, s);
     if (options.acts) add_act_tissues(s);
+    add_free_fluid(options.free_fluid, s);
     for (AcousticProperties& a : s.acoustics) {
         if (a.kind == TissueKind::fluid) a.attenuation += kFluidSteepening;
     }
@@ -314,6 +336,11 @@ void balls_of_frame(const PhysicalScene& scene,
                     std::vector<TargetBall>& balls) {
     constexpr double kSmallestMm = 0.4;  // what is smaller is gone
     balls.clear();
+    if (scene.free_fluid && change.has_level) {  // everything else lies in it
+        balls.push_back(*scene.free_fluid);
+        balls.back().level_up = change.level_up;
+        balls.back().level_mm = change.level_mm;
+    }
     for (TargetBall ball : scene.targets) {
         const int target = ball.lesion - first_target;
         if (target >= 0 && target < SceneChange::kMaxTargets) {

@@ -53,7 +53,12 @@ struct TargetBall {
     double wall = 0;      // amplitude of its surface
     bool fluid = false;
     bool anywhere = false;  // shows in fluid as well: a wire or catheter
-    int lesion = -1;        // of the exercise's shown lesions; -1: what an act has put there
+    // Free fluid: it has no surface of its own, takes the place of this label alone, and ends at a
+    // plane so far above the centre; up: unit vector in the volume.
+    int only_label = -1;
+    Vector3 level_up;
+    double level_mm = 0;
+    int lesion = -1;  // of the exercise's shown lesions; -1: what an act has put there
 };
 
 // Cells of the plates of organs (plate_kind()) from the volume's corner on, x fastest: 1 where the
@@ -97,6 +102,7 @@ struct PhysicalScene {
     std::vector<TargetBall> targets;
     // Acoustics of what acts put into the tissue; -1: the exercise has no procedure.
     int clear_pool = -1, blood_pool = -1, wire = -1, catheter = -1;
+    std::optional<TargetBall> free_fluid;  // without its level
 
     int labels() const { return static_cast<int>(bundle->labels.size()); }
 };
@@ -109,6 +115,7 @@ struct PhysicalSceneOptions {
     bool fine = false;                                 // physical::shows_fine()
     bool speckle_reduction = true;                     // whether the machine has it
     bool acts = false;                                 // the exercise has a procedure
+    FreeFluid free_fluid;                              // of the exercise
 };
 
 // targets: those of the exercise, with its findings; those that only mark a place do not show in
@@ -122,7 +129,7 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
 // The balls of a frame: the scene's, with the exercise's targets as large as they still are, and
 // what acts have put between them. first_target: number of shown lesions before the targets.
 // balls: cleared; allocates nothing within kMaxFrameBalls.
-inline constexpr std::size_t kMaxFrameBalls = physical::kMaxTargets + SceneChange::kMaxPools + 4;
+inline constexpr std::size_t kMaxFrameBalls = physical::kMaxTargets + SceneChange::kMaxPools + 5;
 void balls_of_frame(const PhysicalScene& scene,
                     const SceneChange& change,
                     int first_target,

@@ -214,13 +214,19 @@ NearTarget near_target(const ReferenceInput& in, const TargetBall& t, Point3 v) 
     NearTarget near;
     near.reached = smooth <= kTargetReachMm;
     if (!near.reached) return near;
+    if (t.only_label >= 0) {
+        near.distance_mm = std::max(smooth, dot(t.level_up, from_centre) - t.level_mm);
+        return near;
+    }
     near.distance_mm = smooth + in.scene.roughness_mm * roughness_at(in.scene, v).shift;
     near.normal = slope / std::max(norm(slope), 1e-3);
     return near;
 }
 
-// Only soft tissue gives way to a ball, and blood and other fluid to a wire.
+// Only soft tissue gives way to a ball, blood and other fluid to a wire, and one label to free
+// fluid.
 bool gives_way(const ReferenceInput& in, const Sample& p, const TargetBall& t) {
+    if (t.only_label >= 0) return p.place.label == t.only_label;
     const TissueKind kind = in.scene.acoustics[p.place.label].kind;
     return kind == TissueKind::soft || (t.anywhere && kind == TissueKind::fluid);
 }
@@ -260,7 +266,7 @@ void find_target(const ReferenceInput& in, Sample& p) {
 
 void meet_targets(const ReferenceInput& in, Vector3 beam, Sample& p) {
     for (const TargetBall& t : balls_of(in)) {
-        if (!gives_way(in, p, t)) continue;
+        if (t.only_label >= 0 || !gives_way(in, p, t)) continue;
         const NearTarget near = near_target(in, t, p.v);
         if (!near.reached) continue;
         const Roughness rough = roughness_at(in.scene, p.v);
