@@ -5,7 +5,7 @@ import {readFileSync, writeFileSync} from 'node:fs';
 import {createServer} from 'node:http';
 import {join} from 'node:path';
 import {site_server} from '../../../scripts/web-serve.mjs';
-import {Browser, expect, expect_equal, folder, run, run_tests} from './support.mjs';
+import {Browser, cook_draft, expect, expect_equal, folder, run, run_tests} from './support.mjs';
 
 const [program, bin] = process.argv.slice(2);
 const work = folder();
@@ -340,7 +340,7 @@ await run_tests({
     async a_procedure_is_asked_done_and_ticked() {
         const procedures = join(work, 'procedures.sonocase'), its_site = join(work, 'procedures');
         const scenario = new URL('../../../scenarios/procedures', import.meta.url).pathname;
-        run(join(bin, 'sonocase'), 'build', scenario, '--preset', 'draft', '--quiet', '-o', procedures);
+        cook_draft(bin, procedures, scenario);
         run(join(bin, 'sonocase'), 'publish', procedures, '-o', its_site, '--program', program);
         const [its_server, its_url] = await serve(its_site);
         const page = await browser.page();
