@@ -5,6 +5,7 @@
 // <!--CASES--> are publish's to fill.
 import {createHash} from 'node:crypto';
 import {mkdirSync, readFileSync, writeFileSync} from 'node:fs';
+import {page_catalogues} from './web-words.mjs';
 
 const [page, wasm, out] = process.argv.slice(2);
 const read = (name) => readFileSync(`${page}/${name}`, 'utf8');
@@ -12,7 +13,7 @@ const hash = (data) => createHash('sha256').update(data).digest('base64');
 
 // Modules in the order in which they need each other. Each imports by one line per module and exports declarations
 // only, and top-level names are unique: then the text without those words is the same program.
-const modules = ['core.js', 'source.js', 'arriving.js', 'results.js', 'picture.js', 'poses.js', 'scan_keys.js', 'hands.js', 'doppler.js', 'view3d.js', 'scan.js', 'app.js'];
+const modules = ['words.js', 'core.js', 'source.js', 'arriving.js', 'results.js', 'picture.js', 'poses.js', 'scan_keys.js', 'hands.js', 'doppler.js', 'view3d.js', 'scan.js', 'app.js'];
 const seen = new Map();
 let script = '// SPDX-License-Identifier: Apache-2.0\n';
 for (const name of modules) {
@@ -35,14 +36,22 @@ script = script.split('\n').filter((line) => {
     return keep;
 }).join('\n');
 
+// One file of words for each language but English, fetched by those who read it.
+const catalogues = page_catalogues(new URL('..', import.meta.url).pathname).map(({code, name, words, missing}) => {
+    if (missing.length) throw new Error(`${page}/locale/${code}.po lacks: ${missing.join(' | ')}`);
+    return {code, name, file: `words-${code}.json`, text: JSON.stringify(words)};
+});
+script = script.replace(' /*LANGUAGES*/', () => catalogues.map(({code, name}) => `, ${JSON.stringify([code, name])}`).join(''));
+
 mkdirSync(out, {recursive: true});
+for (const {file, text} of catalogues) writeFileSync(`${out}/${file}`, text);
 const style = read('style.css'), index = read('index.html'), binary = readFileSync(`${wasm}/sonoplay.wasm`);
 const scalar = readFileSync(`${wasm}/sonoplay-scalar.wasm`);
-const version = createHash('sha256').update(script).update(style).update(index).update(binary).update(scalar).digest('hex').slice(0, 16);
+const version = createHash('sha256').update(script).update(style).update(index).update(binary).update(scalar).update(catalogues.map(({text}) => text).join()).digest('hex').slice(0, 16);
 writeFileSync(`${out}/index.html`, index);
 writeFileSync(`${out}/style.css`, style);
 writeFileSync(`${out}/sonoplay.js`, script);
-writeFileSync(`${out}/worker.js`, read('worker.js').replace('@VERSION@', version));
+writeFileSync(`${out}/worker.js`, read('worker.js').replace('@VERSION@', version).replace('@WORDS@', catalogues.map(({file}) => file).join("', '")));
 writeFileSync(`${out}/sonoplay.wasm`, binary);
 writeFileSync(`${out}/sonoplay-scalar.wasm`, scalar);
 
@@ -53,7 +62,8 @@ const single = index
     .replaceAll(/<link rel="preload".*\n/g, '')
     .replace('<link rel="stylesheet" href="style.css">', () => `<style>${style}</style>`)
     .replace('<script type="module" src="sonoplay.js"></script>', '')
-    .replace('</body>', () => `<!--LIST-->\n<!--CASES-->\n<script type="text/plain" id="program">${binary.toString('base64')}</script>\n`
+    .replace('</body>', () => catalogues.map(({code, text}) => `<script type="application/json" id="words-${code}">${text.replaceAll('<', '\\u003c')}</script>\n`).join('')
+        + `<!--LIST-->\n<!--CASES-->\n<script type="text/plain" id="program">${binary.toString('base64')}</script>\n`
         + `<script type="module">${script}</script>\n</body>`);
 if (!single.includes(policy) || !single.includes('<style>')) throw new Error('index.html no longer has what single.html replaces');
 writeFileSync(`${out}/single.html`, single);

@@ -5,20 +5,23 @@
 import {createReadStream, readFileSync, statSync} from 'node:fs';
 import {createServer} from 'node:http';
 import {extname, join, normalize} from 'node:path';
-import {brotliCompressSync} from 'node:zlib';
+import {brotliCompressSync, constants} from 'node:zlib';
 
 const kTypes = {'.html': 'text/html; charset=utf-8', '.css': 'text/css', '.js': 'text/javascript', '.json': 'application/json',
     '.wasm': 'application/wasm', '.png': 'image/png'};
 
+// Once for all servers of this process. quality: of brotli; 11, the best, takes 5 s for a program.
+const compressed = new Map();
+function brotli(file, {mtimeMs}, quality) {
+    const key = `${file} ${mtimeMs} ${quality}`;
+    if (!compressed.has(key))
+        compressed.set(key, brotliCompressSync(readFileSync(file), {params: {[constants.BROTLI_PARAM_QUALITY]: quality}}));
+    return compressed.get(key);
+}
+
 // site: a folder. before(request, response): for tests; true where it has answered itself. Returns the server; listen()
 // it.
-export function site_server(site, before = () => false) {
-    const compressed = new Map();
-    const brotli = (file, {mtimeMs}) => {
-        const key = `${file} ${mtimeMs}`;
-        if (!compressed.has(key)) compressed.set(key, brotliCompressSync(readFileSync(file)));
-        return compressed.get(key);
-    };
+export function site_server(site, before = () => false, quality = 5) {
     return createServer((request, response) => {
         if (before(request, response)) return;
         const path = decodeURIComponent(new URL(request.url, 'http://x').pathname);
@@ -39,7 +42,7 @@ export function site_server(site, before = () => false) {
         }
         const packs = /\.(html|css|js|json|wasm)$/.test(file) && /\bbr\b/.test(request.headers['accept-encoding'] ?? '');
         if (packs && size > 0) {
-            const bytes = brotli(file, state);
+            const bytes = brotli(file, state, quality);
             response.writeHead(200, {...headers, 'Content-Encoding': 'br', 'Content-Length': bytes.length});
             response.end(request.method === 'HEAD' ? undefined : bytes);
             return;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "formats/base/digest.h"
+#include "formats/text/toml_reader.h"
 
 namespace sonocase {
 
@@ -22,6 +23,23 @@ CaseExercises exercises_of(const CaseBundle& bundle, const std::string& where) {
     }
     if (out.exercises.empty()) out.exercises.push_back(free_scan(bundle));
     return out;
+}
+
+std::vector<ExerciseTexts> texts_of_exercise(const CaseBundle& bundle,
+                                             const std::string& exercise) {
+    for (const EmbeddedExercise& embedded : bundle.exercises) {
+        if (embedded.name != exercise) continue;
+        if (auto texts = parse_exercise_texts(embedded.toml, embedded.name))
+            return std::move(*texts);
+    }
+    return {};
+}
+
+std::string case_title(const CaseManifest& manifest) {
+    std::string title;
+    if (const auto recipe = TomlTable::parse(manifest.recipe, manifest.case_name))
+        recipe->text("title", title);
+    return title.empty() ? manifest.case_name : title;
 }
 
 Exercise free_scan(const CaseBundle& bundle) {

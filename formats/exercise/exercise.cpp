@@ -443,6 +443,12 @@ Matrix3 free_fluid_axes(const FreeFluid& fluid) {
     return Matrix3::from_columns(cross(up, head), up, head);
 }
 
+double half_face_mm(const Probe& probe) {
+    return probe.shape == ProbeShape::curvilinear
+               ? probe.radius_mm * std::sin(0.5 * probe.field_of_view_rad)
+               : 0.5 * probe.width_mm;
+}
+
 double needle_diameter_mm(const NeedleModel& needle) {
     if (needle.diameter_mm > 0) return needle.diameter_mm;
     // Outer diameters of regular hypodermic tubing, ISO 9626, mm; between whole gauges by

@@ -33,6 +33,10 @@ struct Probe {
     double elevation_mm = 3;  // full beam thickness at the focus
 };
 
+// From the middle of the picture to the end of the face, where the orientation mark stands: beside
+// the end that x points to.
+double half_face_mm(const Probe& probe);
+
 struct NeedleModel {
     const NeedleMake* make = &needle_makes().front();  // how it shows; never null
     double gauge = 18;                                 // used for the diameter if diameter_mm is 0

@@ -37,12 +37,6 @@ Rigid probe_pose(Point3 skin, Vector3 beam, Vector3 lateral) {
     return {Matrix3::from_columns(cross(elevation, beam), elevation, beam), skin - Point3{}};
 }
 
-double half_face_mm(const Probe& probe) {
-    return probe.shape == ProbeShape::curvilinear
-               ? probe.radius_mm * std::sin(0.5 * probe.field_of_view_rad)
-               : 0.5 * probe.width_mm;
-}
-
 NeedlePlanner::NeedlePlanner(const CaseLabels& labels, const AimOptions& options)
     : options_(options),
       anatomy_(labels.bundle(), options.breathing),

@@ -59,7 +59,5 @@ class NeedlePlanner {
 
 // The pose of a probe whose face has its middle at `skin`.
 Rigid probe_pose(Point3 skin, Vector3 beam, Vector3 lateral);
-// Half the width of the face that touches the skin.
-double half_face_mm(const Probe& probe);
 
 }  // namespace sonocase::pipeline::inline check

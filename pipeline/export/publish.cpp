@@ -13,6 +13,7 @@
 #include "formats/exercise/case_exercises.h"
 #include "formats/files/atomic_file.h"
 #include "formats/text/json_reader.h"
+#include "pipeline/base/program_beside.h"
 
 namespace sonocase::pipeline::inline exporting {
 namespace {
@@ -42,7 +43,9 @@ Result<ReadCase> site_case(std::span<const std::uint8_t> given, const std::strin
     SONOCASE_TRY(auto first, parts_to_open(bytes, path));
     out.first = std::move(first);
     out.name = plain_name(path);
-    out.title = bundle.manifest.case_name.empty() ? out.name : bundle.manifest.case_name;
+    out.case_name = bundle.manifest.case_name;
+    out.title = case_title(bundle.manifest);
+    if (out.title.empty()) out.title = out.name;
     out.bytes = bytes.size();
     out.digest = digest_of(bytes);
     out.file = out.name + "-" + out.digest.substr(0, 8) + ".sonocase";
@@ -51,7 +54,8 @@ Result<ReadCase> site_case(std::span<const std::uint8_t> given, const std::strin
             hash_of(bytes.subspan(at, std::min(kSegmentBytes, bytes.size() - at))));
     out.preview = std::move(bundle.preview_png);
     for (const Exercise& exercise : exercises)
-        out.exercises.push_back({exercise.name, exercise.title, exercise.description});
+        out.exercises.push_back({exercise.name, exercise.title, exercise.description,
+                                 exercise.mastery, texts_of_exercise(bundle, exercise.name)});
     return read;
 }
 
@@ -72,6 +76,7 @@ std::string site_list_json(const std::vector<SiteCase>& cases,
         Json item = Json::object();
         item["name"] = one.name;
         item["title"] = one.title;
+        item["case"] = one.case_name;
         item["file"] = one.file;
         item["bytes"] = one.bytes;
         item["digest"] = one.digest;
@@ -89,6 +94,9 @@ std::string site_list_json(const std::vector<SiteCase>& cases,
             entry["name"] = exercise.name;
             entry["title"] = exercise.title;
             entry["description"] = exercise.description;
+            entry["mastery"] = exercise.mastery;
+            for (const ExerciseTexts& texts : exercise.texts)
+                entry["titles"][texts.language] = texts.title;
             exercises.push_back(std::move(entry));
         }
         item["exercises"] = std::move(exercises);
@@ -188,7 +196,27 @@ Result<std::string> other_hosts(const PublishOptions& options) {
     return out;
 }
 
-Result<std::vector<ReadCase>> read_cases(const std::vector<std::string>& paths) {
+std::string quoted(const std::string& text) {
+    std::string out = "'";
+    for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    return out + "'";
+}
+
+// The case's cover as the window draws it: PNG of the ultrasound at the start of the first
+// exercise.
+Result<std::vector<std::uint8_t>> cover_of(const std::string& path) {
+    TemporaryFolder folder;
+    SONOCASE_TRY_DONE(folder.make("sonocase-cover"));
+    const std::string arguments = quoted(path) +
+                                  " --headless --frames 1 --tracker mouse --size 416x260 --out " +
+                                  quoted(folder.path()) + " 2>&1";
+    SONOCASE_TRY_DONE(output_of_program_beside("sonoplay", arguments, "install the player"));
+    return read_file(folder.path() + "/frame_00000.png");
+}
+
+// warnings: of covers that could not be drawn, whose cases keep their bundle's slices.
+Result<std::vector<ReadCase>> read_cases(const std::vector<std::string>& paths,
+                                         std::vector<std::string>& warnings) {
     std::vector<ReadCase> out;
     std::set<std::string> names;
     for (const std::string& path : paths) {
@@ -196,6 +224,14 @@ Result<std::vector<ReadCase>> read_cases(const std::vector<std::string>& paths) 
         SONOCASE_TRY(auto read, site_case(bytes, path));
         if (!names.insert(read.site.name).second) {
             return Error{"two cases are named " + read.site.name, path, "rename one of the files"};
+        }
+        auto cover = cover_of(path);
+        if (cover) {
+            read.site.preview = std::move(*cover);
+        } else {
+            warnings.push_back("The card of " + read.site.name +
+                               " shows slices of its labels instead of the ultrasound: " +
+                               cover.error().message());
         }
         out.push_back(std::move(read));
     }
@@ -257,7 +293,8 @@ Result<Published> publish(const std::vector<std::string>& cases,
         SONOCASE_TRY(auto found, find_program());
         program = std::move(found);
     }
-    SONOCASE_TRY(const auto read, read_cases(cases));
+    Published out;
+    SONOCASE_TRY(const auto read, read_cases(cases, out.warnings));
     if (options.single_file) return publish_page(read, program, site, options);
 
     SONOCASE_TRY(auto index, read_text_file(program + "/index.html"));
@@ -265,7 +302,6 @@ Result<Published> publish(const std::vector<std::string>& cases,
     if (!hosts.empty()) {
         SONOCASE_TRY_DONE(replace_once(index, "connect-src 'self'", "connect-src 'self'" + hosts));
     }
-    Published out;
     Status written = Done{};
     const auto write = [&](const std::string& name, const auto& content) {
         if (!written) return;
@@ -280,7 +316,15 @@ Result<Published> publish(const std::vector<std::string>& cases,
             write(one.site.name + ".png", std::span<const std::uint8_t>(one.site.preview));
         list.push_back(one.site);
     }
-    for (const char* name : kProgramFiles) {
+    std::vector<std::string> names(std::begin(kProgramFiles), std::end(kProgramFiles));
+    std::error_code failed;
+    for (fs::directory_iterator it(program, failed), end; !failed && it != end;
+         it.increment(failed))
+        if (const std::string name = it->path().filename().string();
+            name.starts_with("words-") && name.ends_with(".json"))
+            names.push_back(name);
+    std::sort(names.begin(), names.end());
+    for (const std::string& name : names) {
         SONOCASE_TRY(const auto bytes, read_file(program + "/" + name));
         write(name, std::span<const std::uint8_t>(bytes));
     }

@@ -11,6 +11,7 @@
 
 #include "formats/base/arrivals.h"
 #include "formats/base/result.h"
+#include "formats/exercise/exercise_texts.h"
 
 namespace sonocase::pipeline::inline exporting {
 
@@ -19,16 +20,21 @@ namespace sonocase::pipeline::inline exporting {
 inline constexpr std::size_t kSegmentBytes = std::size_t{4} << 10;
 
 struct SiteCase {
-    std::string name;   // in the address: letters, digits, - and _
-    std::string title;  // shown
-    std::string file;   // "NAME-DIGITS.sonocase"; the name changes with the content
+    std::string name;       // in the address: letters, digits, - and _
+    std::string title;      // shown: that of its recipe
+    std::string case_name;  // in recordings and scores
+    std::string file;       // "NAME-DIGITS.sonocase"; the name changes with the content
     std::uint64_t bytes = 0;
     std::string digest;                   // XXH3-128 of all bytes
     std::vector<std::uint64_t> segments;  // XXH3-64 of each kSegmentBytes, the last one shorter
     std::vector<ByteRange> first;         // needed before the case can be opened
-    std::vector<std::uint8_t> preview;    // PNG; may be empty
+    // PNG, may be empty: publish() puts the ultrasound at the start of the first exercise in place
+    // of the slices that a bundle has.
+    std::vector<std::uint8_t> preview;
     struct Entry {
         std::string name, title, description;
+        int mastery = 3;                   // passes in a row
+        std::vector<ExerciseTexts> texts;  // in other languages
     };
     std::vector<Entry> exercises;
 };

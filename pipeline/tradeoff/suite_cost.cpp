@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/files/atomic_file.h"
+#include "pipeline/base/program_beside.h"
 #include "pipeline/base/text.h"
-#include "pipeline/tradeoff/program_beside.h"
 #include "pipeline/tradeoff/suites.h"
 
 namespace sonocase::pipeline::inline tradeoff {
@@ -34,7 +34,7 @@ Result<Measured> build(TemporaryFolder& folder, const Settings& settings) {
         output_of_program_beside("sonocase",
                                  text("build '%s' -o '%s/cost.sonocase' --report '%s' --quiet 2>&1",
                                       recipe.c_str(), folder.path().c_str(), report.c_str()),
-                                 "cost"));
+                                 "leave --suite cost out"));
     SONOCASE_TRY(const auto written, read_text_file(report));
     const auto json = nlohmann::json::parse(written, nullptr, false);
     if (json.is_discarded() || !json.contains("expected"))

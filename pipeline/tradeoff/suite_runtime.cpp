@@ -11,10 +11,10 @@
 
 #include "formats/files/atomic_file.h"
 #include "formats/files/load_save.h"
+#include "pipeline/base/program_beside.h"
 #include "pipeline/cook/cook_case.h"
 #include "pipeline/stages/read_recipe.h"
 #include "pipeline/texture/read_example.h"
-#include "pipeline/tradeoff/program_beside.h"
 #include "pipeline/tradeoff/suites.h"
 
 namespace sonocase::pipeline::inline tradeoff {
@@ -378,7 +378,8 @@ Result<Measured> measure(const std::string& blocks, const Settings& settings) {
         if (s.key == "press.iterations") iterations = s.value;
     }
     const std::string arguments = "'" + blocks + "' '" + increments + "' '" + iterations + "'";
-    SONOCASE_TRY(const auto text, output_of_program_beside("press_block", arguments, "press"));
+    SONOCASE_TRY(const auto text,
+                 output_of_program_beside("press_block", arguments, "leave --suite press out"));
     const auto json = nlohmann::json::parse(text, nullptr, false);
     if (json.is_discarded() || !json.contains("blocks"))
         return Error{"is not the errors of blocks", "press_block " + arguments,
@@ -438,7 +439,8 @@ namespace {
 // Measured by the program doppler_trial.
 Result<Measured> measure(const std::string& arguments) {
     SONOCASE_TRY(const auto text,
-                 output_of_program_beside("doppler_trial", arguments, "colour and spectrum"));
+                 output_of_program_beside("doppler_trial", arguments,
+                                          "leave --suite colour and spectrum out"));
     const auto json = nlohmann::json::parse(text, nullptr, false);
     if (json.is_discarded() || !json.contains("error") || !json.contains("seconds"))
         return Error{"is not the error of a trial", "doppler_trial " + arguments,

@@ -138,9 +138,7 @@ bool MouseTracker::place_needle_beside_probe(double offset_mm, bool in_plane) {
 
 bool MouseTracker::take_needle(const Probe& probe, bool in_plane) {
     // So far from the probe that the hand does not touch it.
-    const double half = probe.shape == ProbeShape::curvilinear
-                            ? probe.radius_mm * std::sin(0.5 * probe.field_of_view_rad)
-                            : 0.5 * probe.width_mm;
+    const double half = half_face_mm(probe);
     return place_needle_beside_probe(in_plane ? half + 8 : 18, in_plane);
 }
 

@@ -2,19 +2,50 @@
 
 #include "runtime/web/page_json.h"
 
+#include <cmath>
+
+#include "formats/base/clinical_names.h"
+#include "formats/exercise/case_exercises.h"
 #include "formats/exercise/metric_table.h"
+#include "formats/scoring/attempt_result.h"
 #include "formats/text/json_reader.h"
+#include "runtime/engine/image_presets.h"
 
 namespace sonocase::runtime::inline web {
 namespace {
 
 using detail::Json;
 
-Json json_of_exercise(const Exercise& exercise) {
+// The texts of an exercise in one of its other languages, whole.
+Json json_of_texts(const ExerciseTexts& texts) {
+    Json out = Json::object();
+    out["title"] = texts.title;
+    out["description"] = texts.description;
+    out["hints"] = texts.hints;
+    Json steps = Json::array(), items = Json::array();
+    for (const ExerciseTexts::Step& step : texts.steps)
+        steps.push_back(Json({{"title", step.title}, {"instruction", step.instruction}}));
+    for (const ExerciseTexts::Item& item : texts.items)
+        items.push_back(Json({{"name", item.name},
+                              {"title", item.title},
+                              {"question", item.question},
+                              {"options", item.options}}));
+    out["steps"] = std::move(steps);
+    out["items"] = std::move(items);
+    return out;
+}
+
+Json json_of_exercise(const CaseBundle& bundle, const Exercise& exercise) {
     Json out = Json::object();
     out["name"] = exercise.name;
     out["title"] = exercise.title;
     out["description"] = exercise.description;
+    const std::vector<ExerciseTexts> texts = texts_of_exercise(bundle, exercise.name);
+    out["texts"] = Json::object();
+    for (const ExerciseTexts& one : texts)
+        out["texts"][one.language] = json_of_texts(texts_in(exercise, texts, one.language));
+    out["mastery"] = exercise.mastery;
+    out["mark_mm"] = half_face_mm(exercise.probe);
     out["kind"] = exercise.kind;
     out["difficulty"] = exercise.difficulty;
     out["mode"] = exercise.mode == ExerciseMode::exam ? "exam" : "practice";
@@ -44,27 +75,72 @@ Json json_of_exercise(const Exercise& exercise) {
 std::string case_json(const PagePlayer& player) {
     Json out = Json::object();
     out["case_name"] = player.bundle()->manifest.case_name;
+    out["title"] = case_title(player.bundle()->manifest);
+    Json presets = Json::array();
+    for (const ImagePreset& preset : kPresets)
+        presets.push_back(Json({{"name", preset.name},
+                                {"tip", preset.tip},
+                                {"depth_mm", preset.depth_mm},
+                                {"focus_mm", preset.focus_mm}}));
+    out["presets"] = std::move(presets);
+    Json complications = Json::object();
+    for (std::size_t n = 0; n < complication_names().size(); ++n)
+        complications[std::string(complication_names()[n])] = complication_titles()[n];
+    out["complications"] = std::move(complications);
     Json exercises = Json::array();
     for (const Exercise& exercise : player.exercises())
-        exercises.push_back(json_of_exercise(exercise));
+        exercises.push_back(json_of_exercise(*player.bundle(), exercise));
     out["exercises"] = std::move(exercises);
     Json labels = Json::array();
-    for (const Label& label : player.bundle()->labels) labels.push_back(label.name);
+    for (const Label& label : player.bundle()->labels) {
+        const LabelParts parts = label_parts(label.name);
+        labels.push_back(Json({{"name", label.name},
+                               {"english", clinical_name(label.name)},
+                               {"words", parts.words},
+                               {"side", parts.side},
+                               {"number", parts.number}}));
+    }
     out["labels"] = std::move(labels);
     out["warnings"] = player.warnings();
     return detail::json_text(out, false);
 }
 
-std::string metric_words_json() {
-    Json out = Json::array();
-    for (const MetricInfo& info : metric_table()) {
-        Json item = Json::object();
-        item["name"] = info.name;
-        item["group"] = info.group;
-        item["title"] = info.title;
-        item["unit"] = metric_unit(info.name);
-        out.push_back(std::move(item));
+std::string result_json(const SessionScore& score) {
+    const AttemptResult result = attempt_result(score);
+    Json out = Json::object();
+    out["has_marks"] = result.has_marks;
+    out["passed"] = result.passed;
+    out["marks"] = result.marks;
+    out["marks_reached"] = result.marks_reached;
+    out["advice"] = result.advice;
+    Json rows = Json::array(), measures = Json::array();
+    for (const ResultRow& row : result.rows)
+        rows.push_back(Json({{"title", row.title},
+                             {"value", metric_words(row.metric, row.value)},
+                             {"measured", std::isfinite(row.value)},
+                             {"has_limit", row.has_limit},
+                             {"at_least", row.at_least},
+                             {"none", !row.at_least && row.limit == 0},
+                             {"limit", metric_words(row.metric, row.limit)},
+                             {"reached", row.reached}}));
+    for (const Metric& metric : score.metrics) {
+        const MetricInfo* info = find_metric(metric.name);
+        if (!info || !std::isfinite(metric.value)) continue;
+        measures.push_back(Json({{"title", info->title},
+                                 {"value", metric_words(metric.name, metric.value)},
+                                 {"evidence", info->evidence[0] != 0}}));
     }
+    out["rows"] = std::move(rows);
+    out["measures"] = std::move(measures);
+    return detail::json_text(out, false);
+}
+
+std::string guide_json(const GuidedStart& guide) {
+    Json out = Json::object();
+    out["step"] = static_cast<int>(guide.step());
+    out["steps"] = kGuideSteps;
+    out["title"] = guide_title(guide.step());
+    out["words"] = guide_words(guide.step());
     return detail::json_text(out, false);
 }
 

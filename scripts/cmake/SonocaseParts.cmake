@@ -74,15 +74,12 @@ function(sonocase_missing_text variable group)
   set(${variable} "${names} ${verb} missing (scripts/install-packages ${group})" PARENT_SCOPE)
 endfunction()
 
-# sonocase_part(PART TITLE GROUP PACKAGES PACKAGE=THING... [ALSO PACKAGE=THING...] [NEEDS PART...] [BARRED WHY] [DEFAULT STATE])
+# sonocase_part(PART TITLE GROUP PACKAGES PACKAGE=THING... [ALSO PACKAGE=THING...] [NEEDS PART...] [BARRED WHY])
 # decides SONOCASE_<PART>. GROUP is that of scripts/packages.txt. Without those in ALSO some of the part is left out: said where
 # it is AUTO, an error where it is ON. BARRED: why the part cannot be built here; empty where it can.
 function(sonocase_part part title group)
-  cmake_parse_arguments(arg "" "BARRED;DEFAULT" "PACKAGES;ALSO;NEEDS" ${ARGN})
-  if(NOT DEFINED arg_DEFAULT)
-    set(arg_DEFAULT AUTO)
-  endif()
-  set(SONOCASE_${part} ${arg_DEFAULT} CACHE STRING "${title}: AUTO where its packages are installed, ON or OFF")
+  cmake_parse_arguments(arg "" "BARRED" "PACKAGES;ALSO;NEEDS" ${ARGN})
+  set(SONOCASE_${part} AUTO CACHE STRING "${title}: AUTO where its packages are installed, ON or OFF")
   set_property(CACHE SONOCASE_${part} PROPERTY STRINGS AUTO ON OFF)
   set_property(GLOBAL PROPERTY sonocase_title_${part} "${title}")
   set(state "$CACHE{SONOCASE_${part}}")

@@ -22,12 +22,6 @@ using runtime::MouseTracker;
 
 namespace {
 
-double half_face_mm(const Probe& probe) {
-    return probe.shape == ProbeShape::curvilinear
-               ? probe.radius_mm * std::sin(0.5 * probe.field_of_view_rad)
-               : 0.5 * probe.width_mm;
-}
-
 void take_needle(Attempt& a, bool in_plane) {
     a.mouse.place_needle_beside_probe(in_plane ? half_face_mm(a.exercise.probe) + 8 : 18, in_plane);
     a.tick();

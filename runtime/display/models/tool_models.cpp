@@ -89,10 +89,7 @@ struct ProbeSize {
     double half_mm, grip_mm;
 };
 ProbeSize probe_size(const Probe& probe) {
-    double half = 0.5 * probe.width_mm;
-    if (probe.shape == ProbeShape::curvilinear)
-        half = probe.radius_mm * std::sin(0.5 * probe.field_of_view_rad);
-    half = std::clamp(half, 8.0, 45.0) + 3;
+    const double half = std::clamp(half_face_mm(probe), 8.0, 45.0) + 3;
     return {half, std::clamp(0.55 * half, 9.0, 17.0)};
 }
 

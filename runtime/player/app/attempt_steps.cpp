@@ -400,7 +400,8 @@ void note_attempt(Progress& progress,
     for (const ProgressEntry& entry : progress.history) {
         if (entry.case_name == case_name && entry.exercise == exercise) earlier.push_back(entry);
     }
-    training.result = attempt_result(score, earlier);
+    training.result = attempt_result(score);
+    add_trend(earlier, score, *training.result);
     progress.class_records.reset();
     // A slip of the hand is not an attempt; the progress book leaves it out too.
     constexpr double kMinAttemptS = 3;

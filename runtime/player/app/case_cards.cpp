@@ -15,7 +15,7 @@
 #include <sstream>
 #include <thread>
 
-#include "formats/text/toml_reader.h"
+#include "formats/exercise/case_exercises.h"
 #include "runtime/engine/scan_engine.h"
 #include "runtime/player/app/settings.h"
 #include "runtime/player/session/open_case.h"
@@ -117,14 +117,6 @@ std::string state_of(const std::string& path) {
     std::string state;
     for (const std::string& one : states) state += one + " ";
     return state;
-}
-
-// The title that the recipe gives the case; its name where it gives none.
-std::string case_title(const CaseManifest& manifest) {
-    std::string title;
-    if (const auto recipe = TomlTable::parse(manifest.recipe, manifest.case_name))
-        recipe->text("title", title);
-    return title.empty() ? manifest.case_name : title;
 }
 
 void draw_picture(const OpenCase& open, CaseCard& card) {

@@ -262,7 +262,7 @@ void choose_preset(PlayerState& player,
                    const ImagePreset& preset) {
     loaded.engine.image.depth_mm = preset.depth_mm;
     loaded.engine.image.focus_mm = preset.focus_mm;
-    console.controls.settings.gain_db = 0;  // at which an exercise opens, with even depth gain
+    console.controls.settings.gain_db = 0;
     console.controls.settings.tgc_db = {};
     rebuild_engine(player, loaded, console);
 }

@@ -6,6 +6,7 @@
 
 #include <string>
 
+#include "runtime/engine/image_presets.h"
 #include "runtime/player/app/states.h"
 
 namespace sonocase::runtime::inline player_app {
@@ -40,17 +41,7 @@ void aim_doppler(Notices& notices, CaseState& loaded, Console& console);
 void fit_image(
     PlayerState& player, CaseState& loaded, Console& console, int width_px, int height_px);
 
-// Depth, focus and gain for an organ, as a machine's presets set them.
-struct ImagePreset {
-    const char *name, *tip;  // English keys of the catalogue
-    double depth_mm, focus_mm;
-};
-inline constexpr ImagePreset kPresets[] = {
-    {"Liver", "Depth 16 cm, focus 8 cm", 160, 80},
-    {"Kidney", "Depth 12 cm, focus 6 cm", 120, 60},
-    {"Vessel", "Depth 5 cm, focus 2 cm", 50, 20},
-    {"Deep", "Depth 22 cm, focus 12 cm", 220, 120},
-};
+// At gain 0, at which an exercise opens, with even depth gain.
 void choose_preset(PlayerState& player,
                    CaseState& loaded,
                    Console& console,

@@ -11,8 +11,8 @@
 
 #include "formats/exercise/course.h"
 #include "formats/progress_book/progress_book.h"
-#include "runtime/player/app/attempt_result.h"
 #include "runtime/player/app/notices.h"
+#include "runtime/player/app/standing.h"
 
 namespace sonocase::runtime::inline player_app {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "formats/scoring/draw_attempt.h"
-#include "runtime/player/app/attempt_result.h"
+#include "runtime/player/app/standing.h"
 
 namespace sonocase::runtime::inline player_app {
 namespace {

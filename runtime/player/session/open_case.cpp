@@ -35,14 +35,6 @@ void add_own_exercises(OpenCase& open) {
 }
 
 // Of an exercise that the bundle holds and that parses.
-std::vector<ExerciseTexts> embedded_texts(const OpenCase& open, const std::string& name) {
-    for (const EmbeddedExercise& embedded : open.bundle->exercises) {
-        if (embedded.name != name) continue;
-        if (auto texts = parse_exercise_texts(embedded.toml, open.path)) return std::move(*texts);
-    }
-    return {};
-}
-
 }  // namespace
 
 ExerciseTexts texts_of(const OpenCase& open, int exercise, const std::string& language) {
@@ -61,7 +53,7 @@ Result<std::unique_ptr<OpenCase>> open_case(const std::string& path) {
     open->warnings = std::move(found.warnings);
     open->exercise_digests = std::move(found.digests);
     for (const Exercise& exercise : open->exercises)
-        open->texts.push_back(embedded_texts(*open, exercise.name));
+        open->texts.push_back(texts_of_exercise(*open->bundle, exercise.name));
     add_own_exercises(*open);
     return open;
 }

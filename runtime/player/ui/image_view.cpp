@@ -74,10 +74,7 @@ void draw_depth_scale(const ImagePlace& place, const ImageViewInput& input, floa
 void draw_orientation_mark(const ImagePlace& place, const ImageViewInput& input, float s) {
     ImDrawList* draw = ImGui::GetWindowDrawList();
     const double px_per_mm = 1 / place.mm_per_screen_px;
-    double half_mm = 0.5 * input.probe.width_mm;
-    if (input.probe.shape == ProbeShape::curvilinear) {
-        half_mm = input.probe.radius_mm * std::sin(0.5 * input.probe.field_of_view_rad);
-    }
+    const double half_mm = half_face_mm(input.probe);
     const float side = input.flipped ? -1.0f : 1.0f;
     const ImVec2 mark{static_cast<float>(place.origin_x) +
                           side * (static_cast<float>(half_mm * px_per_mm) + 20 * s),

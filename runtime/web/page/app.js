@@ -7,6 +7,7 @@ import {PoseSource} from './poses.js';
 import {ScanPage, element} from './scan.js';
 import {ArrivingCase} from './arriving.js';
 import {inside_page, load_list, open_bytes} from './source.js';
+import {begin_words, choose_language, exercise_texts, language_in_use, languages, missing_words, t} from './words.js';
 
 const $ = (id) => document.getElementById(id);
 const kPages = ['start', 'scan', 'after', 'scores'];
@@ -20,6 +21,14 @@ class App {
     listen() {
         const click = (id, what) => $(id).addEventListener('click', what);
         for (const button of document.querySelectorAll('.open-help')) button.addEventListener('click', () => this.help());
+        $('language').replaceChildren(...languages().map(([code, name]) => new Option(name, code)));
+        $('language').value = language_in_use();
+        $('language').addEventListener('change', () => choose_language($('language').value));
+        click('guided', () => this.go_on('guide'));
+        click('practise', () => this.go_on('practice'));
+        click('examine', () => this.go_on('exam'));
+        click('next', () => this.choose_exercise(this.exercise + 1));
+        $('search').addEventListener('input', () => this.show_cases());
         click('open-about', () => $('about').showModal());
         for (const button of document.querySelectorAll('dialog .close')) button.addEventListener('click', () => button.closest('dialog').close());
         click('open-scores', () => this.show_scores());
@@ -61,7 +70,7 @@ class App {
         const ready = program.then(() => { this.ready = true; }, (error) => this.say(error));
         const wanted = this.list.cases.find((one) => one.name === asked.get('case'));
         if (!wanted) this.show_cases();
-        if (asked.get('case') && !wanted) this.say(new PlainError(`This site has no case named ${asked.get('case')}.`));
+        if (asked.get('case') && !wanted) this.say(new PlainError(t('This site has no case named {}.', asked.get('case'))));
         if (wanted) await this.open(wanted, asked.get('exercise'));
         if (wanted) this.show_cases();  // its pictures need not come before that of the case
         await ready;
@@ -71,7 +80,7 @@ class App {
     program() {
         this.program_made ??= (async () => {
             if (!globalThis.WebAssembly)
-                throw new PlainError('This browser has no WebAssembly, which the pictures need. Use a current browser.');
+                throw new PlainError(t('This browser has no WebAssembly, which the pictures need. Use a current browser.'));
             const name = has_simd() ? 'sonoplay' : 'sonoplay-scalar';
             const inside = inside_page('program');
             try {
@@ -82,8 +91,8 @@ class App {
             } catch (error) {
                 if (error instanceof PlainError) throw error;
                 if (error instanceof RangeError || /memory/i.test(error?.message ?? ''))
-                    throw new PlainError('There is not enough memory for the program. Close other pages and load this page again.');
-                throw new PlainError('The program did not load. Check the network and load the page again.');
+                    throw new PlainError(t('There is not enough memory for the program. Close other pages and load this page again.'));
+                throw new PlainError(t('The program did not load. Check the network and load the page again.'));
             }
         })();
         return this.program_made;
@@ -93,31 +102,88 @@ class App {
         for (const page of kPages) $(page).hidden = page !== name;
         document.body.classList.toggle('scanning', name === 'scan');
         if (name !== 'scan') this.scan.hide();
+        if (name === 'start' && this.list) this.show_cases();
         scrollTo(0, 0);
     }
     say(error) {
         console.error(error);
         $('notice').textContent = error instanceof PlainError ? error.message
             : error instanceof WebAssembly.RuntimeError || error instanceof RangeError
-                ? 'There is not enough memory for this case. Close other pages and load this page again.'
-                : `Something failed that should not: ${error.message}`;
+                ? t('There is not enough memory for this case. Close other pages and load this page again.')
+                : t('Something failed that should not: {}', error.message);
     }
 
-    show_cases() {
-        $('cases').replaceChildren(...this.list.cases.map((entry) => {
-            const button = element('button', '', {type: 'button'});
+    // Each case with the ultrasound at its start, and its exercises with how the trainee stands.
+    async show_cases() {
+        if (this.list.cases.length) await this.read_kept();
+        const wanted = $('search').value.trim().toLowerCase();
+        const shown = this.list.cases.filter((entry) => [entry.title, entry.name, ...entry.exercises.map(title_of)].some((one) => one.toLowerCase().includes(wanted)));
+        $('search').hidden = this.list.cases.length < 2;
+        $('cases').replaceChildren(...shown.map((entry) => {
+            const item = element('li');
             const picture = entry.preview ? element('img', '', {src: entry.preview, alt: '', loading: 'lazy'})
                 : element('span', '', {className: 'no-picture'});
-            const words = element('span', '', {className: 'words'});
-            words.append(element('strong', entry.title), element('span', `${(entry.bytes / 1e6).toFixed(1)} MB`, {className: 'second'}));
-            for (const exercise of entry.exercises) words.append(element('span', exercise.title || exercise.name, {className: 'second'}));
-            button.append(picture, words);
-            button.addEventListener('click', () => this.open(entry));
-            const item = element('li');
-            item.append(button);
+            picture.addEventListener('click', () => this.open(entry));  // as the first exercise, for who points at it
+            const words = element('div', '', {className: 'words'});
+            words.append(element('h2', entry.title), element('p', t('%s · %.1f MB · exercises: %zu', entry.name, entry.bytes / 1e6, entry.exercises.length), {className: 'second'}));
+            item.append(picture, words, ...entry.exercises.map((exercise) => {
+                const button = element('button', '', {type: 'button'}), {good, said} = this.standing(entry, exercise);
+                button.append(element('span', good === null ? '◎' : good ? '✓' : '✗', {className: `mark ${good === null ? '' : good ? 'pass' : 'fail'}`}),
+                    element('span', title_of(exercise)), element('span', said, {className: 'second'}));
+                button.firstChild.setAttribute('aria-hidden', 'true');
+                button.addEventListener('click', () => this.open(entry, exercise.name));
+                return button;
+            }));
             return item;
         }));
-        if (!this.list.cases.length) $('notice').textContent = 'This site holds no case. Open one from a file.';
+        this.show_next();
+        if (!this.list.cases.length) $('notice').textContent = t('This site holds no case. Open one from a file.');
+    }
+    async read_kept() {
+        try {
+            this.kept = await kept_attempts() ?? [];
+        } catch {
+            this.kept = [];
+        }
+    }
+    attempts_of(case_name, exercise) {
+        return (this.kept ?? []).filter((one) => one.case_name === case_name && one.exercise === exercise);
+    }
+    // How a trainee stands with an exercise, as the window says it.
+    standing(entry, {name, mastery}) {
+        const attempts = this.attempts_of(entry.case ?? entry.title, name);
+        if (!attempts.length) return {good: null, said: t('Not tried')};
+        let row = 0, mastered = false, passes = 0, best = Infinity;
+        for (const {passed, score_text} of attempts) {
+            row = passed ? row + 1 : 0;
+            passes += passed;
+            mastered ||= row >= (mastery ?? 3);
+            best = Math.min(best, JSON.parse(score_text).metrics.final_tip_to_target_mm ?? Infinity);
+        }
+        const said = mastered ? t('Mastered') : passes ? t('Passed %d of %d', passes, attempts.length) : t('Not passed in %d', attempts.length);
+        return {good: passes > 0, said: best < Infinity ? `${said} · ${t('best')} ${best.toFixed(1)} mm` : said};
+    }
+    // Where a trainee goes on: the exercise tried last, the one after it once that was passed; at first the first.
+    next_exercise() {
+        const all = this.list.cases.flatMap((entry) => entry.exercises.map((exercise) => ({entry, exercise})));
+        const last = (this.kept ?? []).at(-1);
+        const at = last ? all.findIndex(({entry, exercise}) => (entry.case ?? entry.title) === last.case_name && exercise.name === last.exercise) : -1;
+        return all[Math.min(at + (last?.passed ? 1 : 0), all.length - 1)] ?? all[0];
+    }
+    show_next() {
+        const next = this.next_exercise();
+        $('go-on').hidden = !next;
+        if (next) $('next-title').textContent = `${title_of(next.exercise)} · ${next.entry.title}`;
+    }
+    async go_on(how) {
+        const {entry, exercise} = this.next_exercise();
+        await this.open(entry, exercise.name);
+        if (!this.scan.shown()) return;
+        if (how === 'guide') this.scan.run_guide(true);
+        else {
+            $('mode').value = how;
+            await this.start_attempt();
+        }
     }
 
     async open(entry, exercise = null) {
@@ -141,8 +207,8 @@ class App {
         const arriving = this.arriving_case, {missing, segments_left} = this.scan.values;
         if (!arriving || !segments_left) return '';
         if (arriving.trouble) return arriving.trouble;
-        const part = `${Math.floor(100 * arriving.part)} %`;
-        return missing ? `Loading this part of the case: less structure until then (${part})` : `Loading the case: ${part}`;
+        const part = Math.floor(100 * arriving.part);
+        return missing ? t('Loading this part of the case: less structure until then (%d %%)', part) : t('Loading the case: %d %%', part);
     }
     // False: the trainee would rather go on, or the case cannot be loaded.
     async whole_case(words) {
@@ -170,7 +236,7 @@ class App {
         $('notice').textContent = '';
         $('loading').hidden = false;
         const progress = (part) => {
-            $('loading-words').textContent = `Loading ${title}: ${Math.floor(100 * part)} %`;
+            $('loading-words').textContent = t('Loading %s: %d %%', title, Math.floor(100 * part));
             $('loading-bar').value = part;
         };
         progress(0);
@@ -182,7 +248,7 @@ class App {
             performance.mark('case-open');
             this.description = description;
             const index = description.exercises.findIndex((one) => one.name === exercise);
-            if (exercise && index < 0) this.scan.notice(`This case has no exercise named ${exercise}.`);
+            if (exercise && index < 0) this.scan.notice(t('This case has no exercise named {}.', exercise));
             else this.scan.notice(description.warnings.join(' '));
             this.choose_exercise(Math.max(index, 0));
         } catch (error) {
@@ -193,7 +259,7 @@ class App {
     }
 
     async choose_exercise(index) {
-        if (this.scan.shown() && this.scan.values.attempt && !await this.ask('Leave this attempt? It will not be kept.', 'Stay', 'Leave')) {
+        if (this.scan.shown() && this.scan.values.attempt && !await this.ask(t('Leave this attempt? It will not be kept.'), t('Stay'), t('Leave'))) {
             $('exercise').value = this.exercise;
             return;
         }
@@ -212,7 +278,7 @@ class App {
         $('picture').focus({preventScroll: true});
     }
     async to_cases() {
-        if (this.scan.values.attempt && !await this.ask('Leave this attempt? It will not be kept.', 'Stay', 'Leave')) return;
+        if (this.scan.values.attempt && !await this.ask(t('Leave this attempt? It will not be kept.'), t('Stay'), t('Leave'))) return;
         this.core.calls.drop_attempt();
         this.show('start');
     }
@@ -236,7 +302,7 @@ class App {
     // The targets lie elsewhere in each attempt, drawn from a seed that the recording keeps.
     async start_attempt() {
         const {drawn} = this.description.exercises[this.exercise];
-        if (drawn && !await this.whole_case('A new place of the target needs the whole case, which is still loading.')) return;
+        if (drawn && !await this.whole_case(t('A new place of the target needs the whole case, which is still loading.'))) return;
         const asked = Number(new URLSearchParams(location.search).get('seed'));
         const seed = !drawn ? 0 : asked > 0 ? asked : 1 + crypto.getRandomValues(new Uint32Array(1))[0] % 1e9;
         this.started = new Date().toISOString().replace(/\.\d+Z$/, 'Z');
@@ -255,7 +321,7 @@ class App {
     }
     async finish_attempt() {
         const {seconds} = this.scan.values;
-        if (seconds < 5 && !await this.ask(`End this attempt? It has run for ${minutes(seconds)} and will not be kept.`, 'Go on', 'End')) return;
+        if (seconds < 5 && !await this.ask(t('End this attempt? It has run for %s and will not be kept.', minutes(seconds)), t('Go on'), t('End'))) return;
         if (seconds < 5) {
             this.core.calls.drop_attempt();
             this.scan.touched();
@@ -264,7 +330,7 @@ class App {
         await this.score_attempt();
     }
     async score_attempt() {
-        if (!await this.whole_case('Scores need the whole case, which is still loading. The attempt stands still.')) return;
+        if (!await this.whole_case(t('Scores need the whole case, which is still loading. The attempt stands still.'))) return;
         const exercise = this.description.exercises[this.exercise];
         let finished;
         try {
@@ -277,10 +343,11 @@ class App {
             exercise: exercise.name, title: exercise.title || exercise.name, passed: finished.score.passed, exam: this.scan.exam(),
             recording: finished.recording, score_text: finished.score_text};
         this.show_after(finished.score);
+        this.kept = [...this.kept ?? [], this.attempt];
         const kept = await keep_attempt(this.attempt);
         const sent = await this.send([['completed', this.attempt, finished.score], ['scored', this.attempt, finished.score]]);
         $('after-notice').textContent = [
-            kept ? '' : 'This browser keeps nothing: save recording and scores now.',
+            kept ? '' : t('This browser keeps nothing: save recording and scores now.'),
             words_of_sending(sent),
             ...finished.score.warnings].filter((words) => words).join(' ');
         this.settled = this.started;  // kept and sent, or said that it was not
@@ -300,35 +367,44 @@ class App {
         });
     }
 
+    // As the window's page after an attempt (page_json.h, result_json).
     show_after(score) {
-        const table = new Map(this.core.metric_words().map((one) => [one.name, one]));
-        const with_unit = (name, value) => value === null ? '–' : `${Number(value.toFixed(2))} ${table.get(name)?.unit ?? ''}`.trim();
-        const title = (name) => table.get(name)?.title ?? name;
-        $('verdict').textContent = !score.pass_marks.length && !score.procedure ? 'Scored' : score.passed ? 'Passed' : 'Not passed yet';
-        const failed = score.pass_marks.filter((mark) => !mark.passed).map((mark) => title(mark.metric));
-        $('why').textContent = failed.length ? `Not reached: ${failed.join(', ')}.` : '';
-        $('marks').replaceChildren(...score.pass_marks.map((mark) => {
-            const needed = [mark.at_most === null ? '' : `at most ${with_unit(mark.metric, mark.at_most)}`,
-                mark.at_least === null ? '' : `at least ${with_unit(mark.metric, mark.at_least)}`].filter((words) => words).join(', ');
-            return row([title(mark.metric), with_unit(mark.metric, mark.value), needed,
-                mark.passed ? '✓ reached' : '✗ not reached'], mark.passed ? 'pass' : 'fail');
+        const result = this.core.result(), exercise = exercise_texts(this.description.exercises[this.exercise]);
+        $('after-title').textContent = `${exercise.title || exercise.name} · ${this.scan.exam() ? t('exam') : t('practice')}`;
+        $('verdict').textContent = !result.has_marks ? t('Attempt finished') : result.passed ? `✓ ${t('Passed')}` : `✗ ${t('Not passed yet')}`;
+        $('verdict').className = !result.has_marks ? '' : result.passed ? 'pass' : 'fail';
+        $('why').textContent = [result.marks ? t('%d of %d marks reached.', result.marks_reached, result.marks) : '',
+            this.scan.hints ? t('Hints used: %d.', this.scan.hints) : ''].filter((words) => words).join(' ');
+        const missed = score.procedure?.items.filter((item) => !item.ticked) ?? [];
+        const first = missed.find((item) => item.critical) ?? missed[0];
+        $('advice').textContent = first && !score.procedure.passed ? `${t('Missing')}: ${item_title(exercise, first)}. ${missed_words(first.why)}.`
+            : result.advice ? t(result.advice) : result.has_marks ? '' : t('This exercise has no pass marks: compare the measures with your own.');
+        $('advice-card').hidden = !$('advice').textContent;
+        $('marks').replaceChildren(...result.rows.map((one) => {
+            const needed = !one.has_limit ? t('No mark for this') : one.none ? t('Needed: none')
+                : one.at_least ? t('Needed at least %s', one.limit) : t('Needed at most %s', one.limit);
+            const verdict = !one.has_limit ? '' : one.reached ? `✓ ${t('reached')}` : one.measured ? `✗ ${t('not reached')}` : `✗ ${t('not measured')}`;
+            return row([t(one.title), one.value, needed, verdict], one.reached ? 'pass' : 'fail');
         }));
-        this.show_checklist(score.procedure);
-        $('measures').replaceChildren(...Object.entries(score.metrics).map(([name, value]) => row([title(name), with_unit(name, value)])));
+        this.show_checklist(score.procedure, exercise);
+        $('measures').replaceChildren(...result.measures.map((one) => row([t(one.title), one.value])));
+        $('next').hidden = this.description.exercises.length < 2;
+        const {exercises} = this.description, next = exercise_texts(exercises[(this.exercise + 1) % exercises.length]);
+        $('next').textContent = `${t('Next')}: ${next.title || next.name}`;
         $('after-notice').textContent = '';
         this.show('after');
         $('verdict').focus();
     }
     // The list of a procedure, each item with its moment in the recording.
-    show_checklist(list) {
+    show_checklist(list, exercise) {
         $('checklist-box').hidden = !list;
         if (!list) return;
         const ticked = list.items.filter((item) => item.ticked).length;
-        $('checklist-words').textContent = [`${ticked} of ${list.items.length} items, ${list.points} of ${list.max_points} points, ${list.cut} needed`,
-            list.stray_acts > list.stray_acts_at_most ? `${list.stray_acts} acts where no step asks for them; at most ${list.stray_acts_at_most} pass` : '',
-            ...list.complications.map((one) => `${one.name.replaceAll('_', ' ')} at ${minutes(one.time_s)}`)].filter((words) => words).join(' · ');
-        $('checklist').replaceChildren(...list.items.map((item) => row([item.title, item.time_s === null ? '–' : minutes(item.time_s),
-            item.critical ? 'critical' : '', item.ticked ? '✓ done' : `✗ ${item.why.replaceAll('_', ' ')}`], item.ticked ? 'pass' : 'fail')));
+        $('checklist-words').textContent = [t('Checklist: %d of %d, %.0f points of %.0f, %.0f needed', ticked, list.items.length, list.points, list.max_points, list.cut),
+            list.stray_acts > list.stray_acts_at_most ? t('%d acts where no step asks for them; at most %d pass.', list.stray_acts, list.stray_acts_at_most) : '',
+            ...list.complications.map((one) => `${t(this.description.complications[one.name] ?? one.name)} ${minutes(one.time_s)}`)].filter((words) => words).join(' · ');
+        $('checklist').replaceChildren(...list.items.map((item) => row([item_title(exercise, item), item.time_s === null ? '–' : minutes(item.time_s),
+            item.critical ? t('critical') : '', item.ticked ? `✓ ${t('done')}` : `✗ ${missed_words(item.why)}`], item.ticked ? 'pass' : 'fail')));
     }
     save(attempt, what) {
         const name = file_name(attempt);
@@ -342,15 +418,15 @@ class App {
         const attempts = await kept_attempts();
         const endpoint = this.list?.xapi ?? '';
         $('scores-words').textContent = [
-            attempts ? attempts.length ? '' : 'No attempt yet.' : 'This browser keeps nothing here.',
-            endpoint ? `This site sends results to the learning record store at ${endpoint}.` : ''].filter((words) => words).join(' ');
+            attempts ? attempts.length ? '' : t('No attempt yet.') : t('This browser keeps nothing here.'),
+            endpoint ? t('This site sends results to the learning record store at {}.', endpoint) : ''].filter((words) => words).join(' ');
         $('scores-remove').hidden = !attempts?.length;
         $('attempts').replaceChildren(...(attempts ?? []).reverse().map((attempt) => {
-            const line = row([attempt.started.replace('T', ' ').replace('Z', ''), attempt.case_name, attempt.exam ? `${attempt.title} (exam)` : attempt.title,
-                attempt.passed ? '✓ Passed' : '✗ Not passed yet', '']);
-            for (const [what, words] of [['recording', 'Recording'], ['scores', 'Scores']]) {
+            const line = row([attempt.started.replace('T', ' ').replace('Z', ''), attempt.case_name, attempt.exam ? `${attempt.title} (${t('exam')})` : attempt.title,
+                attempt.passed ? `✓ ${t('Passed')}` : `✗ ${t('Not passed yet')}`, '']);
+            for (const [what, words] of [['recording', t('Recording')], ['scores', t('Scores')]]) {
                 const button = element('button', words, {type: 'button'});
-                button.setAttribute('aria-label', `${words} of ${attempt.title}, ${attempt.started}`);
+                button.setAttribute('aria-label', `${words}: ${attempt.title}, ${attempt.started}`);
                 button.addEventListener('click', () => this.save(attempt, what));
                 line.lastElementChild.append(button, ' ');
             }
@@ -358,7 +434,7 @@ class App {
         }));
     }
     async remove_scores() {
-        if (!await this.ask('Remove all attempts and recordings from this browser?', 'Keep', 'Remove')) return;
+        if (!await this.ask(t('Remove all attempts and recordings from this browser?'), t('Keep'), t('Remove'))) return;
         await remove_attempts();
         await this.show_scores();
     }
@@ -375,6 +451,14 @@ class App {
     }
 }
 
+// Titles of what a list of cases and a score name, in the language in use.
+function title_of(exercise) { return exercise.titles?.[language_in_use()] || exercise.title || exercise.name; }
+function item_title(exercise, item) { return exercise.items?.find((one) => one.name === item.name)?.title || item.title; }
+function missed_words(why) {
+    return {too_early: t('Too early'), too_late: t('Too late'), happened: t('It happened'), wrong_answer: t('Answered wrongly'),
+        not_answered: t('Not answered')}[why] ?? t('Not done');
+}
+
 function row(cells, last_class = '') {
     const line = element('tr');
     cells.forEach((text, n) => line.append(element('td', text, {className: n === 1 ? 'number' : n === 3 ? last_class : ''})));
@@ -383,17 +467,19 @@ function row(cells, last_class = '') {
 
 async function compile_from(url) {
     const response = await fetch(url);
-    if (!response.ok) throw new PlainError(`The program is missing on this server (${url}: ${response.status}).`);
+    if (!response.ok) throw new PlainError(t('The program is missing on this server ({}: {}).', url, response.status));
     const type = response.headers.get('Content-Type') ?? '';
     // A server that does not know the type of .wasm serves it all the same.
     return type.startsWith('application/wasm') ? WebAssembly.compileStreaming(response)
         : WebAssembly.compile(await response.arrayBuffer());
 }
 
+await begin_words();
 const app = new App();
 // For tests, and for pages that embed this one.
 globalThis.sonoplay = {
     app,
+    words: {missing: missing_words},
     // The last picture: {side, pixels: Uint8Array of grey}.
     frame: () => ({side: app.scan.values.side, pixels: app.core.pixels().slice()}),
 };

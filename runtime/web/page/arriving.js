@@ -4,6 +4,7 @@
 // before it is used; groups of them are kept in the browser's cache storage.
 import {PlainError} from './core.js';
 import {LostConnection, case_cache, fetch_twice, lost} from './source.js';
+import {t} from './words.js';
 
 const kGroup = 256;    // segments that are kept under one key
 const kAhead = 128;    // segments that are fetched ahead at a time
@@ -127,7 +128,7 @@ export class ArrivingCase {
             await this.cache?.put(this.hashes_key(), new Response(bytes)).catch(() => {});
             return bytes;
         }
-        throw new PlainError(`${entry.title} is damaged on the server: its list of segments is wrong. Tell the site's owner.`);
+        throw new PlainError(t('{} is damaged on the server: its list of segments is wrong. Tell the site\'s owner.', entry.title));
     }
 
     // True: the segment's bytes are those of the case. They lie in the program's memory already.
@@ -197,7 +198,7 @@ export class ArrivingCase {
             if (done) break;
             if (at + value.length > end_at) {
                 reader.cancel().catch(() => {});
-                throw new PlainError(`${this.entry.title} is longer than the list says. Tell the site's owner.`);
+                throw new PlainError(t('{} is longer than the list says. Tell the site\'s owner.', this.entry.title));
             }
             // What is there already is left alone: the program reads it.
             for (let from = 0; from < value.length;) {
@@ -223,10 +224,10 @@ export class ArrivingCase {
             throw new NoRanges();
         }
         if (response.status >= 500) throw new TypeError(`answer ${response.status}`);  // may pass
-        if (response.status !== 206) throw new PlainError(`The server answered ${response.status} for ${entry.file}. Tell the site's owner.`);
+        if (response.status !== 206) throw new PlainError(t('The server answered {} for {}. Tell the site\'s owner.', response.status, entry.file));
         if (range[3] !== '*' && Number(range[3]) !== entry.bytes) {
             response.body.cancel().catch(() => {});
-            throw new PlainError(`${entry.title} has another length on the server than the list says. Load the page again.`);
+            throw new PlainError(t('{} has another length on the server than the list says. Load the page again.', entry.title));
         }
         if (Number(range[1]) !== from || Number(range[2]) !== to - 1) {
             response.body.cancel().catch(() => {});
@@ -244,7 +245,7 @@ export class ArrivingCase {
         const {entry} = this;
         const response = await fetch_twice(entry.file, {signal: this.stopping.signal, cache: 'reload'}, (r) => r.ok);
         const {wrong, at} = await this.take(response, 0, entry.bytes);
-        if (at < entry.bytes) throw new PlainError(`${entry.title} arrived cut short. Try again.`);
+        if (at < entry.bytes) throw new PlainError(t('{} arrived cut short. Try again.', entry.title));
         if (wrong.length) throw new Damaged(`${entry.title} is damaged: a checksum differs. Try again.`);
     }
 
@@ -326,7 +327,7 @@ export class ArrivingCase {
             if (!this.streaming) this.stream();
             return;
         }
-        const here = `${Math.floor(100 * this.part)} % of the case is here, the rest of it is shown with less structure.`;
+        const here = t('%d %% of the case is here, the rest of it is shown with less structure.', Math.floor(100 * this.part));
         if (error instanceof PlainError && !(error instanceof LostConnection)) {
             this.trouble = `${error.message} ${here}`;
             this.stopping.abort();
@@ -334,7 +335,7 @@ export class ArrivingCase {
             this.changed();
             return;
         }
-        this.trouble = `No connection: ${here}`;
+        this.trouble = `${t('No connection')}: ${here}`;
         this.changed();
         this.waiting ??= new Promise((done) => {
             this.wake = done;

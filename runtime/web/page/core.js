@@ -3,6 +3,8 @@
 // The program (program/exports.cpp) as an object: memory, texts and calls. Runs in pages and in
 // node alike.
 
+import {t} from './words.js';
+
 // The values that the program returns, in the order of exports.cpp.
 export const kValues = [
     'side', 'mm_per_px', 'origin_x', 'origin_y', 'depth_mm', 'focus_mm', 'model_paper', 'has_needle',
@@ -36,7 +38,7 @@ export class Core {
         const imports = {
             env: {emscripten_notify_memory_growth: unused},
             wasi_snapshot_preview1: {
-                proc_exit: () => { throw new PlainError('The program stopped. Load the page again.'); },
+                proc_exit: () => { throw new PlainError(t('The program stopped. Load the page again.')); },
                 fd_write: (fd, parts, count, written) => core.write(parts, count, written),
                 fd_close: unused, fd_seek: unused, fd_read: unused,
                 environ_sizes_get: (count, bytes) => {
@@ -50,14 +52,14 @@ export class Core {
         };
         for (const {module, name} of WebAssembly.Module.imports(program)) {
             if (!imports[module] || !imports[module][name])
-                throw new PlainError(`The program asks for ${module}.${name}, which this page lacks.`);
+                throw new PlainError(t('The program asks for {}, which this page lacks.', `${module}.${name}`));
         }
         const instance = await WebAssembly.instantiate(program, imports);
         core.calls = instance.exports;
         core.memory = instance.exports.memory;
         instance.exports._initialize?.();
         if (core.calls.value_count() !== kValues.length)
-            throw new PlainError('Page and program are of different versions. Load the page again.');
+            throw new PlainError(t('Page and program are of different versions. Load the page again.'));
         return core;
     }
 
@@ -224,8 +226,11 @@ export class Core {
         const score_text = this.text();
         return {recording, score_text, score: JSON.parse(score_text)};
     }
-    metric_words() {
-        this.calls.metric_words();
+    // The attempt that finished last, for the page after it (page_json.h).
+    result() {
+        this.calls.result();
         return JSON.parse(this.text());
     }
+    // Where the guided start stands (page_json.h), once per picture; null: it does not run.
+    guide(frozen) { return this.calls.guide(frozen ? 1 : 0) ? JSON.parse(this.text()) : null; }
 }

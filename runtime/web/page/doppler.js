@@ -3,6 +3,7 @@
 // The Doppler modes on the scanning page: switch, console, box and gate, strip, sound. What they show is the program's,
 // as the desktop has it.
 import {kDopplerModes} from './core.js';
+import {t} from './words.js';
 
 const kStripPart = 0.34, kStripSide = 8, kStripRoom = 60;  // part of the picture's height; px beside the strip
 const kStripWide = 768, kStripHigh = 192;
@@ -60,7 +61,7 @@ export class Doppler {
             this.aimed = true;
         }
         if (mode !== 'off' && mode !== 'm_mode' && !this.core.values().has_flow)
-            scan.notice('This case says nothing about the flow of blood, so that Doppler modes show none.');
+            scan.notice(t('This case says nothing about the flow of blood, so that Doppler modes show none.'));
         this.say_console();
         scan.fit_later();
         scan.touched();
@@ -68,7 +69,7 @@ export class Doppler {
     // Blood flow comes late.
     choose_later(mode) {
         const {scan, core} = this, {description} = scan;
-        scan.notice('Doppler modes are shown as soon as the case has loaded.');
+        scan.notice(t('Doppler modes are shown as soon as the case has loaded.'));
         scan.page.arriving_case.whole.then(() => {
             if (scan.core === core && scan.description === description) this.choose(mode);
         }, () => {});
@@ -83,7 +84,7 @@ export class Doppler {
         this.scan.touched();
     }
     aim() {
-        if (!this.core.calls.aim_doppler()) this.scan.notice('The picture\'s plane cuts no vessel.');
+        if (!this.core.calls.aim_doppler()) this.scan.notice(t('The picture\'s plane cuts no open vessel here: slide or tilt the probe.'));
         this.say_console();
         this.scan.touched();
     }
@@ -150,11 +151,11 @@ export class Doppler {
     }
     words() {
         const v = this.scan.values;
-        if (this.mode === 'm_mode') return 'Depth over time; a tick per second';
-        if (!v.has_flow) return 'No flow in this case';
-        if (this.mode !== 'spectral') return `${v.machine_hz.toFixed(0)} pictures per second`;
-        if (!v.beats) return 'PSV, EDV and RI after one beat';
-        return `PSV ${v.psv.toFixed(1)}  EDV ${v.edv.toFixed(1)} cm/s  RI ${v.resistive_index.toFixed(2)}  flow ${v.flow.toFixed(0)} ml/min`;
+        if (this.mode === 'm_mode') return t('Depth over time; a tick per second');
+        if (!v.has_flow) return t('No flow in this case');
+        if (this.mode !== 'spectral') return t('%.0f pictures per second', v.machine_hz);
+        if (!v.beats) return t('PSV, EDV and RI after one beat');
+        return t('PSV %.1f  EDV %.1f cm/s  RI %.2f  flow %.0f ml/min', v.psv, v.edv, v.resistive_index, v.flow);
     }
 
     // Box or gate, and the axes of strip and colours. on: of picture.js
@@ -221,7 +222,7 @@ export class Doppler {
         try {
             if (on) this.audio = Object.assign(new AudioContext(), {next_s: 0, loudest: 0, left: 0});
         } catch {
-            this.scan.notice('This browser makes no sound.');
+            this.scan.notice(t('This browser makes no sound.'));
         }
         this.say_console();
     }

@@ -2,6 +2,8 @@
 
 // The picture on its canvas, and what lies over it: depth scale, mark of the probe, measurements.
 
+import {t} from './words.js';
+
 const kWhite = '#e6e8ea';
 
 export class Picture {
@@ -55,7 +57,8 @@ export class Picture {
 
     // targets: in the probe's frame, those that may be shown; name: what lies under the pointer, or null;
     // more(on): draws further marks
-    draw_over(values, flip, measures, first, targets, name, more) {
+    // mark_mm: half of the face
+    draw_over(values, flip, mark_mm, measures, first, targets, name, more) {
         const to = this.overlay.getContext('2d'), ratio = devicePixelRatio;
         to.setTransform(ratio, 0, 0, ratio, 0, 0);
         const height = this.overlay.height / ratio;
@@ -88,8 +91,8 @@ export class Picture {
             line(scale_x, y, scale_x + (is_fifth ? 10 : 5), y);
             if (is_fifth) say(String(cm), scale_x + 14, y + 4);
         }
-        // The side of the probe's mark, as on machines: a letter in a ring.
-        const mark_x = x_of(flip * -0.22 * values.depth_mm), mark_y = Math.max(top + 14, y_of(0) - 14);
+        // The side of the probe's mark, a letter in a ring: beside the face, where x points, as in the window.
+        const mark_x = x_of(flip * mark_mm) + flip * 20, mark_y = Math.max(y_of(0) - 2, top + 14);
         say('S', mark_x - 4, mark_y + 5);
         to.strokeStyle = kWhite;
         to.lineWidth = 1.5;
@@ -113,7 +116,7 @@ export class Picture {
                 to.stroke();
             }
             to.setLineDash([]);
-            if (!cut) say(`${off.toFixed(0)} mm off the plane`, x_of(flip * x) + per_mm * radius + 6, y_of(z) + 4);
+            if (!cut) say(t('%.0f mm off the plane', off), x_of(flip * x) + per_mm * radius + 6, y_of(z) + 4);
         }
         if (name) {
             const rect = this.box.getBoundingClientRect();

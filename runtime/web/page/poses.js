@@ -3,6 +3,8 @@
 // Probe and needle of a tracker on another program: `sonoplay --serve-poses`, named by ?poses=ws://... in the page's
 // address. Messages are those of runtime/tracking/devices/pose_server.h.
 
+import {t} from './words.js';
+
 const kLongestTrackerWaitMs = 10000;
 
 // {probe, needle} of a message, needle may be null; null: it is not one of ours.
@@ -35,7 +37,7 @@ export class PoseSource {
         try {
             socket = new WebSocket(this.url);
         } catch {
-            this.say('The address of the tracker is wrong: ?poses= takes what sonoplay --serve-poses prints.');
+            this.say(t('The address of the tracker is wrong: ?poses= takes what sonoplay --serve-poses prints.'));
             return;
         }
         socket.onmessage = (e) => {
@@ -47,7 +49,7 @@ export class PoseSource {
         };
         // Refused, lost, or not allowed by the site (publish --poses): a page is not told which.
         socket.onclose = () => {
-            this.say('No tracker answers: start sonoplay --serve-poses, and open this page with the address that it prints.');
+            this.say(t('No tracker answers: start sonoplay --serve-poses, and open this page with the address that it prints.'));
             setTimeout(() => this.connect(), Math.min(500 * 2 ** this.tries++, kLongestTrackerWaitMs));
         };
     }

@@ -2,6 +2,8 @@
 
 // Attempts that are kept in this browser, and statements to a learning record store.
 
+import {t} from './words.js';
+
 const kDatabase = 'sonocase', kStore = 'attempts', kWaiting = 'statements';
 
 function request(work) {
@@ -248,11 +250,11 @@ export function send_statements(endpoint, statements, auth = '') {
 
 // What is said where a store did not take all; "": it did.
 export function words_of_sending({waiting, refused, status}) {
-    if (refused) return `The learning record store refuses ${refused} results: save the scores and hand them in.`;
+    if (refused) return t('The learning record store refuses %d results: save the scores and hand them in.', refused);
     if (!waiting) return '';
-    const why = status === 401 || status === 403 ? 'wants another key: open the page from the learning platform again'
-        : status === 0 ? 'does not answer, or does not allow this page (CORS)' : `answers ${status}`;
-    return `The learning record store ${why}. ${waiting} results wait in this browser and are sent again; save the scores to be sure.`;
+    const why = status === 401 || status === 403 ? t('The learning record store wants another key: open the page from the learning platform again.')
+        : status === 0 ? t('The learning record store does not answer, or does not allow this page (CORS).') : t('The learning record store answers %d.', status);
+    return `${why} ${t('%d results wait in this browser and are sent again; save the scores to be sure.', waiting)}`;
 }
 
 export function minutes(seconds) {

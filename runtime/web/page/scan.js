@@ -6,6 +6,7 @@ import {Hands} from './hands.js';
 import {Picture} from './picture.js';
 import {minutes} from './results.js';
 import {View3d} from './view3d.js';
+import {exercise_texts, label_words, t} from './words.js';
 
 const kIdleRate = 40;  // pictures per second while nothing moves: tissue breathes, noise changes
 const kSliders = 8;
@@ -18,16 +19,17 @@ export function element(name, text = '', properties = {}) {
 }
 
 // What the hands have done in a procedure, in one line.
-function hands_words(state) {
-    const named = ({region, mm}) => `${region.replaceAll('_', ' ')} ${mm.toFixed(0)} mm`;
-    return [state.injected_ml > 0 ? `${state.injected_ml.toFixed(0)} ml injected` : '',
-        state.aspirated ? `drawn: ${state.aspirated}` : '',
-        state.throws ? `core: ${state.taken.filter(({mm}) => mm >= 1).map(named).join(', ') || 'nothing'}` : '',
-        state.wire_mm > 0 ? `wire ${state.wire_mm.toFixed(0)} mm in` : '',
-        state.catheter_in ? 'catheter lies' : '',
-        state.drained_ml > 0 ? `${state.drained_ml.toFixed(0)} ml drained` : '',
-        state.compressed_s > 0 ? `${state.compressed_s.toFixed(0)} s pressed` : '',
-        ...state.complications].filter((words) => words).join(' · ');
+// region_words(name): of what a core has taken.
+function hands_words(state, region_words) {
+    const named = ({region, mm}) => `${region_words(region)} ${mm.toFixed(0)} mm`;
+    return [state.injected_ml > 0 ? t('%.0f ml injected', state.injected_ml) : '',
+        state.aspirated ? t('Drawn: %s', t(state.aspirated)) : '',
+        state.throws ? t('Core: %s', state.taken.filter(({mm}) => mm >= 1).map(named).join(', ') || t('nothing')) : '',
+        state.wire_mm > 0 ? t('Wire %.0f mm in', state.wire_mm) : '',
+        state.catheter_in ? t('Catheter lies') : '',
+        state.drained_ml > 0 ? t('%.0f ml drained', state.drained_ml) : '',
+        state.compressed_s > 0 ? t('%.0f s pressed', state.compressed_s) : '',
+        ...state.complications.map((words) => t(words))].filter((words) => words).join(' · ');
 }
 
 export class ScanPage {
@@ -53,7 +55,7 @@ export class ScanPage {
         for (let n = 0; n < kSliders; ++n) {
             const slider = document.createElement('input');
             Object.assign(slider, {type: 'range', min: -20, max: 20, step: 1, value: 0});
-            slider.setAttribute('aria-label', `Depth gain ${n + 1} of ${kSliders}, dB`);
+            slider.setAttribute('aria-label', t('Depth gain %d of %d, dB', n + 1, kSliders));
             slider.addEventListener('input', () => this.set_tgc(n, Number(slider.value)));
             slider.addEventListener('dblclick', () => this.set_tgc(n, 0));
             $('tgc').append(slider);
@@ -68,6 +70,7 @@ export class ScanPage {
         click('probe-home', () => { this.core.calls.probe_home(); this.touched(); });
         click('attempt', () => this.toggle_attempt());
         click('next-hint', () => this.next_hint());
+        click('skip-guide', () => this.skip_guide());
         $('mode').addEventListener('change', () => this.touched());
         click('level', () => this.level());
         click('flip', () => this.flip());
@@ -91,7 +94,7 @@ export class ScanPage {
             const value = Number(field.value), good = field.value !== '' && field.checkValidity();
             field.setAttribute('aria-invalid', String(!good));
             if (good) use(value);
-            else this.notice(`${field.labels[0].textContent}: from ${field.min} to ${field.max}.`);
+            else this.notice(t('%s: from %s to %s.', field.labels[0].textContent, field.min, field.max));
         });
     }
 
@@ -103,11 +106,16 @@ export class ScanPage {
         this.measures = [];
         this.first_point = null;
         this.measure(false);
-        const options = description.exercises.map((one, n) => new Option(one.title || one.name, n));
+        const options = description.exercises.map(exercise_texts).map((one, n) => new Option(one.title || one.name, n));
         $('exercise').replaceChildren(...options);
         $('exercise').value = exercise;
-        $('case-title').textContent = description.case_name;
-        $('task-words').textContent = description.exercises[exercise].description;
+        $('case-title').textContent = description.title;
+        $('task-words').textContent = exercise_texts(description.exercises[exercise]).description;
+        const number = this.page.attempts_of(description.case_name, description.exercises[exercise].name).length + 1;
+        $('attempt-words').textContent = t('Attempt %d · difficulty %d of 5', number, description.exercises[exercise].difficulty);
+        this.make_presets();
+        this.run_guide(false);
+        $('freeze').textContent = t('Freeze');
         this.hints = 0;
         this.say_hint();
         $('mode').value = description.exercises[exercise].mode;
@@ -125,6 +133,40 @@ export class ScanPage {
         this.touched();
     }
     hide() { this.running = false; }
+
+    // Depth, focus and gain for an organ.
+    make_presets() {
+        $('presets').replaceChildren(...this.description.presets.map((preset) => {
+            const button = element('button', t(preset.name), {type: 'button', title: t(preset.tip)});
+            button.addEventListener('click', () => {
+                this.set_console({gain_db: 0, tgc_db: new Array(kSliders).fill(0)});
+                this.set_image(preset);
+            });
+            return button;
+        }));
+    }
+    // The first minutes of a newcomer: one thing to do at a time (runtime/tracking/guided_start.h).
+    run_guide(runs) {
+        this.core.calls.run_guide(runs ? 1 : 0);
+        this.guided = '';
+        $('guide').hidden = !runs;
+    }
+    say_guide() {
+        if ($('guide').hidden) return;
+        const guide = this.core.guide(this.frozen), done = guide.step >= guide.steps;
+        if (this.guided === guide.title) return;
+        this.guided = guide.title;
+        $('guide-step').textContent = t('Step %d of %d', guide.step + 1, guide.steps + 1);
+        $('guide-title').textContent = t(guide.title);
+        $('guide-words').textContent = t(guide.words);
+        $('skip-guide').textContent = done ? t('End') : t('Skip');
+    }
+    skip_guide() {
+        const {step, steps} = this.core.guide(this.frozen);
+        if (step >= steps) this.run_guide(false);
+        else this.core.calls.skip_guide();
+        this.touched();
+    }
     shown() { return this.running && !$('scan').hidden; }
     side() { return this.picture.wanted_side(); }
 
@@ -182,9 +224,10 @@ export class ScanPage {
         this.doppler.picture_drawn();
         this.view3d.picture_drawn(now_s);
         this.frame_ms = performance.now() - before;
-        this.picture.draw_over(this.values, this.flip_sign(), this.measures, this.first_point,
+        this.picture.draw_over(this.values, this.flip_sign(), this.exercise().mark_mm, this.measures, this.first_point,
             this.shows_targets() ? this.core.targets() : [], this.name_there(), (on) => this.doppler.draw_over(on));
         this.say();
+        this.say_guide();
         if (++this.frames === 1) performance.mark('first-picture');
         if (!this.complete && !this.values.missing) {
             this.complete = true;
@@ -200,14 +243,14 @@ export class ScanPage {
         put('arriving', this.page.arriving_words());
         put('value-time', attempt ? minutes(v.seconds) : '–');
         put('value-tip', attempt && v.has_needle && !this.exam() ? number(v.tip_to_target_mm, 1, 'mm') : '–');
-        put('value-view', attempt && v.has_needle ? (v.tip_in_view ? 'Yes' : 'No') : '–');
+        put('value-view', attempt && v.has_needle ? (v.tip_in_view ? t('Yes') : t('No')) : '–');
         put('value-punctures', attempt ? String(v.insertions) : '–');
         put('value-depth', v.has_needle ? number(Math.max(v.needle_depth_mm, 0), 0, 'mm') : '–');
         $('mode').disabled = attempt;
         $('task-words').hidden = attempt;  // read before; its room is for the events
         $('next-hint').disabled = this.exam();
-        put('attempt', attempt ? 'Finish attempt' : 'Start attempt');
-        put('needle', v.has_needle ? 'Withdraw' : 'Needle');
+        put('attempt', attempt ? t('Finish attempt') : t('Start attempt'));
+        put('needle', v.has_needle ? t('Withdraw') : t('Needle'));
         $('needle-across').disabled = v.has_needle === 1;
         $('recording').hidden = !attempt;
         $('needle-depth').disabled = !v.has_needle;
@@ -215,7 +258,7 @@ export class ScanPage {
         if (attempt && this.frames % 10 === 0) this.say_events();
         if (attempt !== !$('procedure').hidden || this.frames % 10 === 0) this.say_procedure(attempt);
         const age = this.frozen ? this.core.calls.kept_age_s(this.back) : 0;
-        put('cine-words', this.frozen ? `FROZEN ${age.toFixed(1)} s ago` : 'Live, last 20 s');
+        put('cine-words', this.frozen ? t('FROZEN %.1f s ago', age) : t('Live, last 20 s'));
         $('cine').disabled = !this.frozen;
         $('cine').max = Math.max(v.kept - 1, 0);
         $('cine').value = Math.max(v.kept - 1, 0) - (this.back ?? 0);
@@ -236,9 +279,12 @@ export class ScanPage {
             this.put_off = -1;
             return;
         }
-        $('hands-words').textContent = hands_words(state);
+        $('hands-words').textContent = hands_words(state, (region) => this.words_of_label(region));
         // Those that wait for an answer; one that was put off comes back with the next answer.
-        const {steps, present, questions, tray} = state;
+        const {present, tray} = state, texts = exercise_texts(this.exercise());
+        const steps = state.steps.map((step, n) => ({...step, ...texts.steps?.[n]}));
+        const questions = state.questions.map((one) => ({...one, words: texts.items?.[one.item]?.question || one.words,
+            options: texts.items?.[one.item]?.options?.length ? texts.items[one.item].options : one.options}));
         const question = questions.find((one) => one.item > this.put_off);
         const said = JSON.stringify([steps, present, questions, this.put_off, tray, this.exam()]);
         if (said === this.procedure_said) return;
@@ -251,9 +297,9 @@ export class ScanPage {
             if (step.state === 'present') line.setAttribute('aria-current', 'step');
             return line;
         }));
-        $('step-words').textContent = steps[present]?.instruction ?? (steps.length ? 'All steps are behind you: finish the attempt.' : '');
+        $('step-words').textContent = steps[present]?.instruction ?? (steps.length ? t('All steps are behind you: finish the attempt.') : '');
         $('question').hidden = !questions.length;
-        $('question-words').textContent = question?.words ?? 'A question waits.';
+        $('question-words').textContent = question?.words ?? t('A question waits');
         const button = (words, act) => {
             const one = element('button', words, {type: 'button'});
             one.addEventListener('click', () => this.perform(act));
@@ -266,13 +312,13 @@ export class ScanPage {
         };
         $('options').replaceChildren(
             ...(question?.options ?? []).map((words, n) => button(words, {kind: kAnswer, index: question.item, amount: n})),
-            question ? choice('Later', question.item, 'It is asked again when the next question is answered') : choice('Show it', -1, ''));
-        $('tray').replaceChildren(...tray.map((act) => button(act.words, act)));
+            question ? choice(t('Later'), question.item, t('It is asked again when the next question is answered')) : choice(t('Show it'), -1, ''));
+        $('tray').replaceChildren(...tray.map((act) => button(t(act.words), act)));
         this.tray = tray;
     }
     perform(act) {
         if (act.kind === kAnswer) this.put_off = -1;
-        if (!this.core.act(act)) this.notice('Too many acts at once: wait a moment.');
+        if (!this.core.act(act)) this.notice(t('Too many acts at once: wait a moment.'));
         this.touched();
     }
     // By its place on the tray.
@@ -303,12 +349,17 @@ export class ScanPage {
         if (!at || this.exam() || this.measuring) return null;
         const rect = $('picture').getBoundingClientRect(), px = this.values.side / rect.width;
         const name = this.core.name_at(Math.floor((at.x - rect.left) * px), Math.floor((at.y - rect.top) * px));
-        return name && {...at, words: name[0].toUpperCase() + name.slice(1).replaceAll('_', ' ')};
+        return name && {...at, words: this.words_of_label(name)};
+    }
+    // The name that an author gave stays as it is.
+    words_of_label(name) {
+        const label = this.description.labels.find((one) => one.name === name);
+        return label ? label_words(label) : name;
     }
     say_hint() {
-        const {hints} = this.exercise(), said = this.hints > 0;
+        const {hints} = exercise_texts(this.exercise()), said = this.hints > 0;
         $('hint').hidden = !said;
-        $('hint').textContent = !said ? '' : this.hints > hints.length ? 'The target is shown.' : `Hint ${this.hints} of ${hints.length}: ${hints[this.hints - 1]}`;
+        $('hint').textContent = !said ? '' : this.hints > hints.length ? t('The target is shown.') : `${t('Hint %d of %d', this.hints, hints.length)}: ${hints[this.hints - 1]}`;
     }
     notice(text) { $('bar-notice').textContent = text; }
 
@@ -329,7 +380,7 @@ export class ScanPage {
     }
     // The textures of the plain picture come late.
     later_paper() {
-        this.notice('The plain picture is shown as soon as the case has loaded.');
+        this.notice(t('The plain picture is shown as soon as the case has loaded.'));
         const core = this.core, description = this.description;
         this.page.arriving_case.whole.then(() => {
             if (this.core !== core || this.description !== description) return;
@@ -357,7 +408,7 @@ export class ScanPage {
         this.frozen = frozen && this.values.kept > 0;
         this.back = 0;
         this.playing = false;
-        $('freeze').textContent = this.frozen ? 'Live' : 'Freeze';
+        $('freeze').textContent = this.frozen ? t('Live') : t('Freeze');
         this.touched();
     }
     look_back(back) {
@@ -373,13 +424,13 @@ export class ScanPage {
     toggle_needle(in_plane) {
         const calls = this.core.calls;
         if (this.values.has_needle) calls.withdraw_needle();
-        else if (!calls.take_needle(in_plane ? 1 : 0)) this.notice('There is no skin beside the probe to put the needle on.');
+        else if (!calls.take_needle(in_plane ? 1 : 0)) this.notice(t('There is no skin beside the probe to put the needle on.'));
         this.touched();
     }
     needle_to(client_x, client_y) {
         const at = this.picture.mm_at(client_x, client_y, this.values);
         if (!this.core.calls.needle_to(this.flip_sign() * at.x, at.z))
-            this.notice('There is no skin beside the probe to put the needle on.');
+            this.notice(t('There is no skin beside the probe to put the needle on.'));
         this.touched();
     }
     push_to(mm) {
@@ -389,7 +440,7 @@ export class ScanPage {
     async device_tilt(box) {
         if (box.checked && !await this.hands.use_tilt(true)) {
             box.checked = false;
-            this.notice('This device does not tell its tilt, or you did not allow it.');
+            this.notice(t('This device does not tell its tilt, or you did not allow it.'));
         } else if (!box.checked) {
             this.hands.use_tilt(false);
         }
@@ -422,7 +473,7 @@ export class ScanPage {
     }
     full_screen() {
         if (document.fullscreenElement) document.exitFullscreen();
-        else document.documentElement.requestFullscreen?.().catch(() => this.notice('This browser does not allow full screen.'));
+        else document.documentElement.requestFullscreen?.().catch(() => this.notice(t('This browser does not allow full screen.')));
     }
 
     toggle_attempt() {

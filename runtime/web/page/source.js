@@ -2,6 +2,7 @@
 
 // Bytes of cases: from the site, from a file, or from the page itself.
 import {PlainError} from './core.js';
+import {t} from './words.js';
 
 // Where parts of cases are kept: cache storage, where the browser gives it (not from file://, not in some private
 // windows).
@@ -16,7 +17,7 @@ export async function case_cache() {
 export class LostConnection extends PlainError {}
 export function lost(error) {
     if (error.name === 'AbortError' || error instanceof PlainError) return error;
-    return new LostConnection('The connection was lost. Check the network and try again.');
+    return new LostConnection(t('The connection was lost. Check the network and try again.'));
 }
 
 // Fetches with one more try, as a connection may break once. good(response) says what is accepted.
@@ -26,7 +27,7 @@ export async function fetch_twice(url, options, good) {
             const response = await fetch(url, options);
             if (good(response)) return response;
             if (response.status < 500 || attempt > 0)
-                throw new PlainError(`The server answered ${response.status} for ${url}. Tell the site's owner.`);
+                throw new PlainError(t('The server answered {} for {}. Tell the site\'s owner.', response.status, url));
         } catch (error) {
             if (attempt > 0 || error.name === 'AbortError' || error instanceof PlainError) throw lost(error);
         }
@@ -41,7 +42,7 @@ export async function load_list() {
         const response = await fetch_twice('cases.json', {cache: 'no-cache'}, (r) => r.ok);
         return await response.json();
     } catch (error) {
-        if (error instanceof SyntaxError) throw new PlainError('The list of cases is damaged. Tell the site\'s owner.');
+        if (error instanceof SyntaxError) throw new PlainError(t('The list of cases is damaged. Tell the site\'s owner.'));
         throw error;
     }
 }

@@ -2,6 +2,8 @@
 
 // The 3-D view beside the picture: skin, organs, probe, scan plane with the picture on it, needle, targets. Meshes and
 // cameras are the program's; colours and light are those of the desktop's view. Off until it is asked for.
+import {t} from './words.js';
+
 const kTanHalf = 0.36, kNear = 10, kFar = 5000;
 const kRate = 15;  // views per second at most: the picture comes first
 const kParts = ['skin', 'probe', 'mark', 'plane', 'needle', 'hub', 'ball'];
@@ -77,7 +79,7 @@ export class View3d {
     }
     show_it(on) {
         if (on && !this.begin_gl()) {
-            this.scan.notice('This browser draws no 3-D view: it has no WebGL2.');
+            this.scan.notice(t('This browser draws no 3-D view: it has no WebGL2.'));
             on = false;
         }
         this.on = on;

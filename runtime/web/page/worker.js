@@ -4,7 +4,7 @@
 // from the cache and are renewed in the background of the next visit; cases are kept by source.js.
 // A host may have several sites, each with its own version.
 const kSite = `sonocase-page-${registration.scope} `, kCache = `${kSite}@VERSION@`;
-const kFiles = ['./', 'index.html', 'style.css', 'sonoplay.js', 'sonoplay.wasm', 'cases.json'];
+const kFiles = ['./', 'index.html', 'style.css', 'sonoplay.js', 'sonoplay.wasm', '@WORDS@', 'cases.json'];
 
 addEventListener('install', (e) => {
     skipWaiting();

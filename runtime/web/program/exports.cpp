@@ -77,6 +77,8 @@ struct Page {
     std::array<double, 32> poses{};
     std::vector<double> numbers;  // of what was asked for last: targets, marks
     std::array<double, 16> doppler{};
+    std::string result;                // result_json() of the attempt that ended last
+    std::optional<GuidedStart> guide;  // runs
 };
 Page page;
 
@@ -248,8 +250,29 @@ SONOCASE_EXPORT(warm_up) void warm_up(int frame) {
 SONOCASE_EXPORT(close_case) void close_case() {
     page.player.reset();
 }
-SONOCASE_EXPORT(metric_words) void metric_words() {
-    page.text = metric_words_json();
+// text(): the attempt that ended last, for the page after it (page_json.h).
+SONOCASE_EXPORT(result) void result() {
+    page.text = page.result;
+}
+// The guided start: begun (1) or ended (0).
+SONOCASE_EXPORT(run_guide) void run_guide(int runs) {
+    page.guide = runs ? std::optional<GuidedStart>(std::in_place) : std::nullopt;
+}
+SONOCASE_EXPORT(skip_guide) void skip_guide() {
+    if (page.guide) page.guide->skip();
+}
+// Once per picture: takes note of what the hands did. 0: no guide runs; else text() is where it
+// stands (page_json.h).
+SONOCASE_EXPORT(guide) int guide(int frozen) {
+    if (!page.guide) return 0;
+    const ToolPoses& tools = page.player->engine().last().tools;
+    page.guide->observe({.has_probe = tools.has_probe,
+                         .mannequin_from_probe = tools.mannequin_from_probe,
+                         .frozen = frozen != 0,
+                         .has_needle = tools.has_needle,
+                         .needle_depth_mm = page.player->hands().needle_depth_mm()});
+    page.text = guide_json(*page.guide);
+    return 1;
 }
 
 SONOCASE_EXPORT(choose_exercise) int choose_exercise(int index, int side_px) {
@@ -397,6 +420,7 @@ SONOCASE_EXPORT(finish_attempt) int finish_attempt() {
     if (!finished) return answer(finished.error());
     page.bytes = std::move(finished->recording);
     page.text = std::move(finished->score_json);
+    page.result = result_json(finished->score);
     return 1;
 }
 

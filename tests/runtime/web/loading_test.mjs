@@ -2,17 +2,16 @@
 
 // loading_test.mjs PROGRAM_FOLDER BIN_FOLDER: a case over the network, in Chromium: a picture before the case is whole,
 // servers and connections that fail, damaged parts, browsers that lack something, two tabs, a tab that slept.
-import {execFileSync} from 'node:child_process';
 import {readFileSync} from 'node:fs';
 import {join} from 'node:path';
 import {pathToFileURL} from 'node:url';
 import {site_server} from '../../../scripts/web-serve.mjs';
-import {Browser, expect, expect_equal, folder, run, run_tests} from './support.mjs';
+import {Browser, cook_draft, expect, expect_equal, folder, run, run_tests} from './support.mjs';
 
 const [program, bin] = process.argv.slice(2);
 const {Core} = await import(pathToFileURL(join(new URL('.', import.meta.url).pathname, '../../../runtime/web/page/core.js')));
 const work = folder(), case_file = join(work, 'demo.sonocase'), site = join(work, 'site');
-execFileSync(join(bin, 'sonocase'), ['build', '--preset', 'draft', '-o', case_file], {stdio: 'ignore'});
+cook_draft(bin, case_file);
 run(join(bin, 'sonocase'), 'publish', case_file, '-o', site, '--program', program);
 const [entry] = JSON.parse(readFileSync(join(site, 'cases.json'))).cases;
 const file_bytes = readFileSync(join(site, entry.file));

@@ -10,7 +10,7 @@ import {Browser} from './support.mjs';
 const [site, name, bin, case_file, session_file] = process.argv.slice(2);
 const kTurns = 24;
 const kSlow = {offline: false, latency: 40, downloadThroughput: 10e6 / 8, uploadThroughput: 10e6 / 8};
-const server = site_server(site);
+const server = site_server(site, undefined, 11);  // sizes are those of the best compression
 await new Promise((done) => server.listen(0, '127.0.0.1', done));
 const base = `http://127.0.0.1:${server.address().port}/`;
 // The server compresses at the first request: not part of a visit.

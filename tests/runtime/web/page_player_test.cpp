@@ -7,12 +7,17 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
+#include "formats/files/atomic_file.h"
 #include "formats/scoring/draw_attempt.h"
+#include "runtime/player/app/settings.h"
+#include "runtime/player/session/open_case.h"
 #include "runtime/web/page_json.h"
 #include "runtime/web/warm_up.h"
 #include "support/small_case.h"
+#include "support/temporary_folder.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -221,13 +226,87 @@ TEST(PagePlayer, warms_up_with_a_case_of_its_own) {
               1000);
 }
 
+TEST(PageJson, gives_the_texts_of_other_languages_whole) {
+    CaseBundle bundle = testing::small_case();
+    bundle.exercises[0].toml +=
+        "[texts.de]\ntitle = \"Finden Sie das Gefäß\"\n";  // and the rest in the exercise's own
+    const auto player = PagePlayer::open(bytes_of(bundle), "small");
+    ASSERT_TRUE(player);
+    EXPECT_NE(case_json(**player).find("\"texts\":{\"de\":{\"title\":\"Finden Sie das Gefäß\""),
+              std::string::npos);
+}
+
+// What the page after an attempt shows is what the window's shows.
+TEST(PageJson, says_values_limits_and_advice_of_an_attempt) {
+    SessionScore score;
+    score.pass_marks = {{"final_tip_to_target_mm", 4.23, 9, -INFINITY, true},
+                        {"tip_in_view_at_advance_fraction", NAN, INFINITY, 0.7, false}};
+    score.metrics = {{"elapsed_time_s", 107.4}, {"insertions", NAN}};
+    const std::string json = result_json(score);
+    for (const char* part : {"\"value\":\"–\",\"measured\":false",
+                             "\"at_least\":true,\"none\":false,\"limit\":\"70 %\"",
+                             "\"value\":\"4.2 mm\"", "\"value\":\"1:47\"", "\"marks_reached\":1"})
+        EXPECT_NE(json.find(part), std::string::npos) << part << "\n" << json;
+    EXPECT_EQ(json.find("\"advice\":\"\""), std::string::npos) << json;
+}
+
+// With the window's settings of a first start, before anything has moved: of each exercise, drawn
+// by either model.
+TEST(PagePlayer, the_first_picture_is_the_windows) {
+    CaseBundle bundle = testing::small_case();
+    bundle.exercises.push_back(bundle.exercises[0]);
+    EmbeddedExercise& physical = bundle.exercises[1];
+    physical.name = "physical";
+    const std::size_t at = physical.toml.find("\"paper\"");
+    ASSERT_NE(at, std::string::npos);
+    physical.toml.replace(at, 7, "\"physical\"");
+    const sonocase::testing::TemporaryFolder folder;
+    const std::string path = folder.path() + "/small.sonocase";
+    const std::vector<std::uint8_t> bytes = write_bundle(bundle);
+    ASSERT_TRUE(write_file(path, std::span<const std::uint8_t>(bytes)));
+    const auto open = open_case_to_render(path);
+    ASSERT_TRUE(open);
+    const auto page = PagePlayer::open(bytes_of(bundle), "small");
+    ASSERT_TRUE(page);
+    ASSERT_EQ((*open)->exercises.size(), 2u);
+    std::string warning;
+    const Settings first = load_settings(folder.path() + "/none.json", warning);
+    ImageSettings console;
+    console.gain_db = first.gain_db;
+    console.dynamic_range_db = first.dynamic_range_db;
+    for (std::size_t i = 0; i < console.tgc_db.size(); ++i) console.tgc_db[i] = first.tgc_db[i];
+    for (int n = 0; n < 2; ++n) {
+        const Exercise& exercise = (*open)->exercises[static_cast<std::size_t>(n)];
+        const PlayerArguments none;
+        ImageChoice image = initial_image(none, exercise);
+        image.depth_mm = exercise.probe.depth_mm;
+        image.focus_mm = exercise.probe.focus_mm;
+        auto engine = make_engine(**open, exercise, none, image);
+        ASSERT_TRUE(engine) << engine.error().message();
+        MouseTracker hands(Skin(*(*open)->bundle), exercise);
+        TrackerReading reading;
+        hands.poll(0.1, reading);
+        engine->observe(reading, false);
+        std::vector<std::uint8_t> window(static_cast<std::size_t>(image.width_px) *
+                                         image.height_px);
+        engine->frame(0.1, console, window);
+        ASSERT_EQ(image.width_px, image.height_px);
+        ASSERT_TRUE((*page)->choose_exercise(n, image.width_px));
+        (*page)->frame(0.1, {});
+        EXPECT_EQ(copy((*page)->pixels()), window) << exercise.name;
+        EXPECT_GT(std::count_if(window.begin(), window.end(), [](auto grey) { return grey > 20; }),
+                  1000);
+    }
+}
+
 TEST(PageJson, names_what_the_page_shows) {
     const auto player = open_small();
     const std::string json = case_json(*player);
     EXPECT_NE(json.find("\"case_name\":\"cylinder\""), std::string::npos) << json;
     EXPECT_NE(json.find("\"title\":\"Find the vessel\""), std::string::npos) << json;
     EXPECT_NE(json.find("\"warnings\":[]"), std::string::npos) << json;
-    EXPECT_NE(metric_words_json().find("\"elapsed_time_s\""), std::string::npos);
+    EXPECT_NE(json.find("\"presets\":[{\"name\":\"Liver\""), std::string::npos) << json;
+    EXPECT_NE(json.find("\"mark_mm\":"), std::string::npos) << json;
 }
 
 }  // namespace

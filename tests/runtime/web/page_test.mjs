@@ -5,7 +5,7 @@ import {readFileSync, writeFileSync} from 'node:fs';
 import {createServer} from 'node:http';
 import {join} from 'node:path';
 import {site_server} from '../../../scripts/web-serve.mjs';
-import {Browser, expect, expect_equal, folder, run, run_tests} from './support.mjs';
+import {Browser, cook_draft, expect, expect_equal, folder, run, run_tests} from './support.mjs';
 
 const [program, bin] = process.argv.slice(2);
 const work = folder();
@@ -340,7 +340,7 @@ await run_tests({
     async a_procedure_is_asked_done_and_ticked() {
         const procedures = join(work, 'procedures.sonocase'), its_site = join(work, 'procedures');
         const scenario = new URL('../../../scenarios/procedures', import.meta.url).pathname;
-        run(join(bin, 'sonocase'), 'build', scenario, '--preset', 'draft', '--quiet', '-o', procedures);
+        cook_draft(bin, procedures, scenario);
         run(join(bin, 'sonocase'), 'publish', procedures, '-o', its_site, '--program', program);
         const [its_server, its_url] = await serve(its_site);
         const page = await browser.page();
@@ -354,7 +354,7 @@ await run_tests({
         expect((await text('question-words')).includes('INR'), 'the question');
         const press = (words) => page.value(`[...document.querySelectorAll("#options button")].find((one) => one.textContent === "${words}").click()`);
         await press('Later');
-        expect_equal(await text('question-words'), 'A question waits.', 'put off');
+        expect_equal(await text('question-words'), 'A question waits', 'put off');
         await press('Show it');
         expect((await text('question-words')).includes('INR'), 'the question again');
         await page.value('document.querySelectorAll("#options button")[1].click()');
@@ -369,12 +369,60 @@ await run_tests({
         const lines = await page.value('[...document.querySelectorAll("#checklist tr")].map((line) => line.textContent)');
         expect_equal(lines.length, 9, 'items');
         expect_equal(lines.filter((line) => line.startsWith('Clotting') && line.includes('done')).length, 1, 'the answer counts');
-        expect(lines.some((line) => line.startsWith('Core') && line.includes('not done')), 'what was left out is named');
-        expect_equal(await text('verdict'), 'Not passed yet', 'verdict');
+        expect(lines.some((line) => line.startsWith('Core') && line.includes('Not done')), 'what was left out is named');
+        expect_equal(await text('verdict'), '✗ Not passed yet', 'verdict');
+        expect((await text('advice')).startsWith('Missing: '), 'the first critical item that is missing is named');
+        // The list, its moments and its points are those of the score, which the desktop gives too.
+        const {items, points, max_points, cut} = JSON.parse(await page.value('sonoplay.app.attempt.score_text')).procedure;
+        expect_equal(await text('checklist-words'), `Checklist: ${items.filter((one) => one.ticked).length} of ${items.length}, ${points} points of ${max_points}, ${cut} needed`, 'points');
+        const clock = (s) => s === null ? '–' : `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, '0')}`;
+        expect_equal(lines.join('|'), items.map((one) => one.title + clock(one.time_s) + (one.critical ? 'critical' : '') + (one.ticked ? '✓ done'
+            : `✗ ${{too_early: 'Too early', too_late: 'Too late', happened: 'It happened', wrong_answer: 'Answered wrongly', not_answered: 'Not answered'}[one.why] ?? 'Not done'}`)).join('|'), 'each line');
         expect_equal(page.errors.join(), '', 'errors on the console');
         await page.close();
         its_server.closeAllConnections?.();
         its_server.close();
+    },
+    async a_newcomer_is_guided_in_german() {
+        const page = await browser.page();
+        await page.open(`${url}?lang=de`);
+        await page.until('sonoplay.app.ready && document.querySelectorAll("#cases button").length === 1');
+        const text = (id) => page.value(`document.getElementById("${id}").textContent`);
+        expect_equal(await page.value('document.documentElement.lang'), 'de', 'language');
+        expect_equal(await text('start-title'), 'Ultraschallfälle', 'title');
+        expect((await page.value('document.querySelector("#cases button").textContent')).includes('Nicht versucht'), 'how one stands');
+        await page.until('document.querySelector("#cases img").naturalWidth === 416');  // the ultrasound that publish drew
+        await page.click('guided');
+        await page.until(`${kFrames} > 0 && document.getElementById("guide-title").textContent === "Schallkopf schieben"`);
+        // A hand's way, picture by picture: a jump would be another exercise.
+        await page.value('(() => { const {core, scan} = sonoplay.app; for (let n = 1; n < 8; ++n) { core.calls.slide(0, 5); scan.draw(performance.now() / 1000 + 0.04 * n); } })()');
+        await page.until('document.getElementById("guide-title").textContent === "Schallkopf kippen"');
+        for (const title of ['Bild anhalten', 'Nadel nehmen']) {
+            await page.click('skip-guide');
+            await page.until(`document.getElementById("guide-title").textContent === "${title}"`);
+        }
+        await page.key('KeyN');
+        await page.until('document.getElementById("guide-step").textContent === "Schritt 5 von 6"');
+        // Presets and the mark's side are the window's.
+        await page.value('document.querySelectorAll("#presets button")[2].click()');
+        expect_equal(await page.value('[sonoplay.app.scan.values.depth_mm, sonoplay.app.scan.values.focus_mm].join()'), '50,20', 'vessel');
+        expect(await page.value(`(() => {
+            const {scan} = sonoplay.app, canvas = document.getElementById('overlay'), on = canvas.getContext('2d');
+            const ring = () => {
+                scan.draw(performance.now() / 1000);
+                const middle = scan.picture.left + scan.values.origin_x * scan.picture.css_side / scan.values.side, {data} = on.getImageData(0, 0, canvas.width, canvas.height);
+                let left = 0, right = 0;
+                const from = middle - scan.picture.css_side / 2, to = middle + scan.picture.css_side / 2;
+                for (let n = 3; n < data.length; n += 4) if (data[n]) { const x = (n >> 2) % canvas.width; if (x > from && x < middle) ++left; else if (x < to && x > middle) ++right; }
+                return [left, right];
+            };
+            const plain = ring();
+            scan.flip();
+            const flipped = ring();
+            return plain[1] > plain[0] && flipped[0] > flipped[1];
+        })()`), 'the mark is on the side that x points to, also when flipped');
+        expect_equal(await page.value('[...sonoplay.words.missing].join(" | ")'), '', 'words without German');
+        await page.close();
     },
     async one_page_opens_from_disk() {
         const file = join(work, 'one.html');

@@ -2,17 +2,15 @@
 
 // Statements to a learning record store (runtime/web/page/results.js), in node: with a store that answers as those of
 // learning platforms do, or does not, and with a browser that keeps things or does not.
-import {readFileSync} from 'node:fs';
 import {createServer} from 'node:http';
 import {webcrypto} from 'node:crypto';
 import {expect, expect_equal, run_tests} from './support.mjs';
 
 globalThis.crypto ??= webcrypto;
 globalThis.location = {href: 'https://site.example.org/ward/index.html?case=demo'};
-const source = readFileSync(new URL('../../../runtime/web/page/results.js', import.meta.url), 'utf8');
 let pages = 0;
 // The module anew, as a page that opens.
-const open_page = () => import(`data:text/javascript,${encodeURIComponent(`${source}\n// page ${++pages}`)}`);
+const open_page = () => import(`../../../runtime/web/page/results.js?${++pages}`);
 
 // As much of IndexedDB as results.js uses; what it holds stays when a page opens anew.
 function kept_storage() {

@@ -38,6 +38,12 @@ export function folder() {
 }
 export const run = (program, ...args) => execFileSync(program, args, {encoding: 'utf8', maxBuffer: 1 << 28});
 
+// Cooks a scenario as a draft; none: the demonstration torso. The tests' scenarios have most stages in common, which are
+// kept beside the programs.
+export function cook_draft(bin, to, ...scenario) {
+    run(join(bin, 'sonocase'), 'build', ...scenario, '--preset', 'draft', '--quiet', '--cache', join(bin, '../web-cases'), '--cache-limit-mb', '300', '-o', to);
+}
+
 // Chromium without a window. Messages go through a pipe, each ended by a zero byte.
 export class Browser {
     static async start(...switches) {

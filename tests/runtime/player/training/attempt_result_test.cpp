@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/app/attempt_result.h"
+#include "runtime/player/app/standing.h"
 
 #include <gtest/gtest.h>
 
@@ -35,8 +35,7 @@ TEST(AttemptResult, ShowsTheWorstMissFirstAndSaysWhatToDo) {
         attempt_result(score_with({{"final_tip_to_target_mm", 4, 5, -INFINITY, true},
                                    {"tip_in_view_at_advance_fraction", 0.2, INFINITY, 0.8, false},
                                    {"insertions", 3, 2, -INFINITY, false}},
-                                  {}),
-                       {});
+                                  {}));
     ASSERT_EQ(result.rows.size(), 3u);
     EXPECT_EQ(result.rows[0].metric, "tip_in_view_at_advance_fraction");  // missed by 3/4 of it
     EXPECT_EQ(result.rows[1].metric, "insertions");                       // by a half
@@ -54,8 +53,7 @@ TEST(AttemptResult, TheAdviceFitsWhatHappened) {
     const auto advice = [](double mm, double scanned) {
         return std::string(
             attempt_result(score_with({{"final_tip_to_target_mm", mm, 5, -INFINITY, mm <= 5}},
-                                      {{"targets_scanned_percent", scanned}}),
-                           {})
+                                      {{"targets_scanned_percent", scanned}}))
                 .advice);
     };
     EXPECT_EQ(advice(NAN, 0).rfind("Find the target first", 0), 0u);
@@ -72,7 +70,7 @@ TEST(AttemptResult, AMissedMarkIsAlwaysAmongTheFive) {
                              "tissue_damage_mm2", "probe_path_length_mm", "needle_path_length_mm"})
         marks.push_back({name, 1, 2, -INFINITY, true});
     marks.push_back({"elapsed_time_s", NAN, 60, -INFINITY, false});
-    const auto result = attempt_result(score_with(marks, {}), {});
+    const auto result = attempt_result(score_with(marks, {}));
     ASSERT_EQ(result.rows.size(), kMaxResults);
     EXPECT_EQ(result.rows[0].metric, "elapsed_time_s");
     EXPECT_EQ(result.marks, 8);
@@ -82,8 +80,7 @@ TEST(AttemptResult, FillsUpWithMeasuresThatHaveEvidenceAndNoOthers) {
     const auto result = attempt_result(score_with({}, {{"elapsed_time_s", 70},
                                                        {"tracking_gap_s", 1},  // no evidence
                                                        {"insertions", 2},
-                                                       {"path_in_tissue_mm", NAN}}),
-                                       {});
+                                                       {"path_in_tissue_mm", NAN}}));
     ASSERT_EQ(result.rows.size(), 2u);
     EXPECT_EQ(result.rows[0].metric, "elapsed_time_s");
     EXPECT_FALSE(result.rows[0].has_limit);
@@ -95,10 +92,10 @@ TEST(AttemptResult, TheTrendEndsWithThisAttemptAndIsNotLong) {
     std::vector<ProgressEntry> earlier;
     for (int i = 0; i < 20; ++i) earlier.push_back(attempt(false, 20 - i));
     earlier.push_back(attempt(false, NAN));
-    const auto result =
-        attempt_result(score_with({{"final_tip_to_target_mm", 3.5, 5, -INFINITY, true}},
-                                  {{"final_tip_to_target_mm", 3.5}}),
-                       earlier);
+    const SessionScore score = score_with({{"final_tip_to_target_mm", 3.5, 5, -INFINITY, true}},
+                                          {{"final_tip_to_target_mm", 3.5}});
+    AttemptResult result = attempt_result(score);
+    add_trend(earlier, score, result);
     ASSERT_EQ(result.trend.size(), kMaxTrend);
     EXPECT_EQ(result.trend.back(), 3.5);
     EXPECT_EQ(result.trend[kMaxTrend - 2], 1);

@@ -9,8 +9,8 @@
 #include "runtime/player/app/attempt_steps.h"
 #include "runtime/player/app/case_cards.h"
 #include "runtime/player/app/clip_saver.h"
-#include "runtime/player/app/guided_start.h"
 #include "runtime/player/session/gif_file.h"
+#include "runtime/tracking/guided_start.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "pipeline/tradeoff/program_beside.h"
+#include "pipeline/base/program_beside.h"
 
 #include <array>
 #include <cstdio>
 #include <filesystem>
 #include <random>
 
-namespace sonocase::pipeline::inline tradeoff {
+namespace sonocase::pipeline::inline base {
 
 TemporaryFolder::~TemporaryFolder() {
     std::error_code ignored;
@@ -27,13 +27,13 @@ Status TemporaryFolder::make(const std::string& name) {
 
 Result<std::string> output_of_program_beside(const std::string& program,
                                              const std::string& arguments,
-                                             const std::string& suites) {
+                                             const std::string& otherwise) {
     std::error_code failed;
     const auto self = std::filesystem::read_symlink("/proc/self/exe", failed);
     const std::string path = (self.parent_path() / program).string();
     if (failed || !std::filesystem::exists(path))
         return Error{"the program " + program + " is not beside this one", path,
-                     "build its target, or leave --suite " + suites + " out"};
+                     "build its target, or " + otherwise};
     const std::string command = "'" + path + "' " + arguments;
     std::string text;
     std::FILE* pipe = popen(command.c_str(), "r");
@@ -45,4 +45,4 @@ Result<std::string> output_of_program_beside(const std::string& program,
     return text;
 }
 
-}  // namespace sonocase::pipeline::inline tradeoff
+}  // namespace sonocase::pipeline::inline base

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What suites need to run programs that lie beside this one: a temporary folder, and their output.
-// Pipeline and runtime do not link each other, so what the runtime measures of itself is measured
-// by a command.
+// What it takes to run programs that lie beside this one: a temporary folder, and their output.
+// Pipeline and runtime do not link each other, so what the runtime measures of itself or draws is
+// had by a command.
 #pragma once
 
 #include <string>
 
 #include "formats/base/result.h"
 
-namespace sonocase::pipeline::inline tradeoff {
+namespace sonocase::pipeline::inline base {
 
 // A folder that is removed with the object.
 class TemporaryFolder {
@@ -28,9 +28,9 @@ class TemporaryFolder {
 };
 
 // Returns what the program prints. arguments: as in a shell, quoted where needed. Error: the
-// program is not there (the message then advises to leave `suites` out), or it fails.
+// program is not there (`otherwise` then says what else can be done), or it fails.
 Result<std::string> output_of_program_beside(const std::string& program,
                                              const std::string& arguments,
-                                             const std::string& suites);
+                                             const std::string& otherwise);
 
-}  // namespace sonocase::pipeline::inline tradeoff
+}  // namespace sonocase::pipeline::inline base

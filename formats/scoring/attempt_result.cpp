@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/app/attempt_result.h"
+#include "formats/scoring/attempt_result.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 
 #include "formats/exercise/metric_table.h"
-#include "formats/scoring/draw_attempt.h"
 
-namespace sonocase::runtime::inline player_app {
+namespace sonocase {
 namespace {
 
 bool is_share(const std::string& metric) {
@@ -47,13 +46,6 @@ ResultRow row_of(const PassResult& mark) {
     return row;
 }
 
-double metric_of(const ProgressEntry& entry, const std::string& name) {
-    for (const Metric& metric : entry.metrics) {
-        if (metric.name == name) return metric.value;
-    }
-    return NAN;
-}
-
 constexpr const char* kFindTarget =
     "Find the target first: slide and tilt the probe until it lies in the middle of the picture.";
 constexpr const char* kTakeNeedle =
@@ -75,7 +67,7 @@ const char* earlier_fault(const SessionScore& score) {
 
 }  // namespace
 
-AttemptResult attempt_result(const SessionScore& score, std::span<const ProgressEntry> earlier) {
+AttemptResult attempt_result(const SessionScore& score) {
     AttemptResult result;
     result.marks = static_cast<int>(score.pass_marks.size());
     result.has_marks = result.marks > 0 || score.procedure;
@@ -110,16 +102,6 @@ AttemptResult attempt_result(const SessionScore& score, std::span<const Progress
         row.title = info ? info->title : "";
         place_on_scale(row);
     }
-    if (result.trend_metric.empty()) return result;
-    for (const ProgressEntry& entry : earlier) {
-        const double value = metric_of(entry, result.trend_metric);
-        if (std::isfinite(value)) result.trend.push_back(value);
-    }
-    const double now = score.value(result.trend_metric);
-    if (std::isfinite(now)) result.trend.push_back(now);
-    if (result.trend.size() > kMaxTrend)
-        result.trend.erase(result.trend.begin(),
-                           result.trend.end() - static_cast<std::ptrdiff_t>(kMaxTrend));
     return result;
 }
 
@@ -141,35 +123,4 @@ std::string metric_words(const std::string& metric, double value) {
     return unit.empty() ? words : std::string(words) + " " + (unit == "percent" ? "%" : unit);
 }
 
-Standing standing(std::span<const ProgressEntry> entries,
-                  const std::string& case_name,
-                  const std::string& exercise,
-                  int mastery) {
-    Standing result;
-    for (const ProgressEntry& entry : entries) {
-        if (entry.case_name != case_name || entry.exercise != exercise) continue;
-        ++result.attempts;
-        result.passes += entry.passed;
-        constexpr double kSkilled = 0.1, kUnskilled = 0.3;  // shares of failures
-        if (!entry.passed) {
-            result.in_a_row = 0;
-            result.cusum = std::max(0.0, result.cusum + std::log(kSkilled / kUnskilled));
-        } else if (attempt_difficulty(entry.seed) >= 0) {
-            ++result.in_a_row;
-            result.cusum += std::log((1 - kSkilled) / (1 - kUnskilled));
-        }
-        if (!result.steady && result.cusum >= kSteadyCusum) {
-            result.steady = true;
-            result.steady_at = entry.started;
-        }
-        if (!result.mastered && result.in_a_row >= std::max(mastery, 1)) {
-            result.mastered = true;
-            result.mastered_at = entry.started;
-        }
-        const double mm = metric_of(entry, "final_tip_to_target_mm");
-        if (std::isfinite(mm) && (result.best_mm < 0 || mm < result.best_mm)) result.best_mm = mm;
-    }
-    return result;
-}
-
-}  // namespace sonocase::runtime::inline player_app
+}  // namespace sonocase

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/app/guided_start.h"
+#include "runtime/tracking/guided_start.h"
 
 #include <cmath>
 
-namespace sonocase::runtime::inline player_app {
+namespace sonocase::runtime::inline tracking {
 namespace {
 
 constexpr double kSlideMm = 25;
@@ -91,4 +91,4 @@ const char* guide_words(GuideStep step) {
     return "";
 }
 
-}  // namespace sonocase::runtime::inline player_app
+}  // namespace sonocase::runtime::inline tracking

@@ -6,7 +6,7 @@
 
 #include "formats/base/geometry.h"
 
-namespace sonocase::runtime::inline player_app {
+namespace sonocase::runtime::inline tracking {
 
 enum class GuideStep { slide, tilt, freeze, needle, advance, done };
 inline constexpr int kGuideSteps = 5;  // without done
@@ -40,4 +40,4 @@ class GuidedStart {
 const char* guide_title(GuideStep step);
 const char* guide_words(GuideStep step);
 
-}  // namespace sonocase::runtime::inline player_app
+}  // namespace sonocase::runtime::inline tracking
