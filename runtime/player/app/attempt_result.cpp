@@ -7,7 +7,6 @@
 #include <cstdio>
 
 #include "formats/exercise/metric_table.h"
-#include "formats/scoring/draw_attempt.h"
 
 namespace sonocase::runtime::inline player_app {
 namespace {
@@ -139,37 +138,6 @@ std::string metric_words(const std::string& metric, double value) {
     const bool whole = std::abs(value - std::round(value)) < 1e-9 || std::abs(value) >= 100;
     std::snprintf(words, sizeof words, whole ? "%.0f" : "%.1f", value);
     return unit.empty() ? words : std::string(words) + " " + (unit == "percent" ? "%" : unit);
-}
-
-Standing standing(std::span<const ProgressEntry> entries,
-                  const std::string& case_name,
-                  const std::string& exercise,
-                  int mastery) {
-    Standing result;
-    for (const ProgressEntry& entry : entries) {
-        if (entry.case_name != case_name || entry.exercise != exercise) continue;
-        ++result.attempts;
-        result.passes += entry.passed;
-        constexpr double kSkilled = 0.1, kUnskilled = 0.3;  // shares of failures
-        if (!entry.passed) {
-            result.in_a_row = 0;
-            result.cusum = std::max(0.0, result.cusum + std::log(kSkilled / kUnskilled));
-        } else if (attempt_difficulty(entry.seed) >= 0) {
-            ++result.in_a_row;
-            result.cusum += std::log((1 - kSkilled) / (1 - kUnskilled));
-        }
-        if (!result.steady && result.cusum >= kSteadyCusum) {
-            result.steady = true;
-            result.steady_at = entry.started;
-        }
-        if (!result.mastered && result.in_a_row >= std::max(mastery, 1)) {
-            result.mastered = true;
-            result.mastered_at = entry.started;
-        }
-        const double mm = metric_of(entry, "final_tip_to_target_mm");
-        if (std::isfinite(mm) && (result.best_mm < 0 || mm < result.best_mm)) result.best_mm = mm;
-    }
-    return result;
 }
 
 }  // namespace sonocase::runtime::inline player_app

@@ -32,7 +32,7 @@
 #include "runtime/player/app/case_cards.h"
 #include "runtime/player/app/class_records.h"
 #include "runtime/player/app/clip_saver.h"
-#include "runtime/player/app/course_progress.h"
+#include "runtime/player/app/find_courses.h"
 #include "runtime/player/app/guided_start.h"
 #include "runtime/player/app/notices.h"
 #include "runtime/player/app/picture_marks.h"

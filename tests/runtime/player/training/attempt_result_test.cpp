@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "formats/exercise/metric_table.h"
+#include "formats/scoring/course_standing.h"
 #include "formats/scoring/draw_attempt.h"
 
 namespace sonocase::runtime {
