@@ -146,8 +146,9 @@ TEST(MarkerSheets, ThePrintedTagsAreReadAndHaveTheirSizes) {
         for (const SeenTag& tag : seen) {
             const TagPlace place = find_tag(bodies, tag.id);
             ASSERT_EQ(place.body, static_cast<int>(b));
-            // Edges along the raster and sharper than any lens makes them are found to half a pixel,
-            // which is 0.1 mm, four together to a tenth of the 3 % by which printers change pages.
+            // Edges along the raster and sharper than any lens makes them are found to half a
+            // pixel, which is 0.1 mm, four together to a tenth of the 3 % by which printers change
+            // pages.
             double mean_mm = 0;
             for (int k = 0; k < 4; ++k) {
                 EXPECT_NEAR(edge_mm(tag, k), bodies[b].tags[place.tag].edge_mm, 0.1) << tag.id;
