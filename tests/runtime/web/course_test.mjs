@@ -68,6 +68,8 @@ const server = await served(site_server(join(work, 'platform'), (request, respon
 }));
 const own_server = await served(site_server(site));
 async function served(of) {
+    // The browser opens connections ahead, and a busy machine may use one only after minutes.
+    of.headersTimeout = of.requestTimeout = 0;
     await new Promise((done) => of.listen(0, '127.0.0.1', done));
     return of;
 }
