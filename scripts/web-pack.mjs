@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // web-pack.mjs PAGE WASM OUT: what `sonocase publish` copies. The page's modules become one script, so that a visit
-// asks for few files, and single.html holds page, style, script and program in one file; its places <!--LIST--> and
-// <!--CASES--> are publish's to fill.
+// asks for few files; those of a course become another. single.html holds page, style, script and program in one file;
+// its places <!--LIST--> and <!--CASES--> are publish's to fill.
 import {createHash} from 'node:crypto';
 import {mkdirSync, readFileSync, writeFileSync} from 'node:fs';
 import {page_catalogues} from './web-words.mjs';
@@ -14,43 +14,53 @@ const hash = (data) => createHash('sha256').update(data).digest('base64');
 // Modules in the order in which they need each other. Each imports by one line per module and exports declarations
 // only, and top-level names are unique: then the text without those words is the same program.
 const modules = ['words.js', 'core.js', 'source.js', 'arriving.js', 'results.js', 'picture.js', 'poses.js', 'scan_keys.js', 'hands.js', 'doppler.js', 'view3d.js', 'scan.js', 'app.js'];
-const seen = new Map();
-let script = '// SPDX-License-Identifier: Apache-2.0\n';
-for (const name of modules) {
-    const lines = read(name).split('\n').filter((line) => !/^import .* from '\.\/[a-z0-9_]+\.js';$/.test(line));
-    for (const line of lines) {
-        if (/^import\b/.test(line)) throw new Error(`${name}: an import on more than one line: ${line}`);
-        const top = /^(?:export )?(?:async )?(?:function|class|const|let) ([A-Za-z_$]+)/.exec(line);
-        if (!top || top[1] === '$') continue;
-        if (seen.has(top[1])) throw new Error(`${name}: ${top[1]} is declared in ${seen.get(top[1])} too`);
-        seen.set(top[1], name);
+const of_course = ['lms.js', 'course.js'];  // fetched where a site has a course
+const seen = new Map(), asked = new Set();
+function packed(names) {
+    let text = '';
+    for (const name of names) {
+        const lines = read(name).split('\n').filter((line) => {
+            const found = /^import \{(.*)\} from '\.\/([a-z0-9_]+\.js)';$/.exec(line);
+            if (found && !names.includes(found[2])) for (const one of found[1].split(', ')) asked.add(one);
+            return !found;
+        });
+        for (const line of lines) {
+            if (/^import\b/.test(line)) throw new Error(`${name}: an import on more than one line: ${line}`);
+            const top = /^(?:export )?(?:async )?(?:function|class|const|let) ([A-Za-z_$]+)/.exec(line);
+            if (!top || top[1] === '$') continue;
+            if (seen.has(top[1])) throw new Error(`${name}: ${top[1]} is declared in ${seen.get(top[1])} too`);
+            seen.set(top[1], name);
+        }
+        text += lines.map((line) => line.replace(/^export /, '')).filter((line) => !/^\/\/ SPDX/.test(line)).join('\n');
     }
-    script += lines.map((line) => line.replace(/^export /, '')).filter((line) => !/^\/\/ SPDX/.test(line)).join('\n');
+    // Each module has its own $, the same everywhere.
+    let first = true;
+    return text.split('\n').filter((line) => {
+        if (!/^const \$ = /.test(line)) return true;
+        const keep = first;
+        first = false;
+        return keep;
+    }).join('\n');
 }
-// Each module has its own $, the same everywhere.
-let first = true;
-script = script.split('\n').filter((line) => {
-    if (!/^const \$ = /.test(line)) return true;
-    const keep = first;
-    first = false;
-    return keep;
-}).join('\n');
-
 // One file of words for each language but English, fetched by those who read it.
 const catalogues = page_catalogues(new URL('..', import.meta.url).pathname).map(({code, name, words, missing}) => {
     if (missing.length) throw new Error(`${page}/locale/${code}.po lacks: ${missing.join(' | ')}`);
     return {code, name, file: `words-${code}.json`, text: JSON.stringify(words)};
 });
-script = script.replace(' /*LANGUAGES*/', () => catalogues.map(({code, name}) => `, ${JSON.stringify([code, name])}`).join(''));
+const licence = '// SPDX-License-Identifier: Apache-2.0\n';
+const main = packed(modules).replace(' /*LANGUAGES*/', () => catalogues.map(({code, name}) => `, ${JSON.stringify([code, name])}`).join('')), later = packed(of_course), needed = [...asked].sort().join(', ');
+const script = `${licence}${main}export {${needed}};\n`;
+const course = `${licence}import {${needed}} from './sonoplay.js';\n${later}export {CourseView};\n`;
 
 mkdirSync(out, {recursive: true});
 for (const {file, text} of catalogues) writeFileSync(`${out}/${file}`, text);
 const style = read('style.css'), index = read('index.html'), binary = readFileSync(`${wasm}/sonoplay.wasm`);
 const scalar = readFileSync(`${wasm}/sonoplay-scalar.wasm`);
-const version = createHash('sha256').update(script).update(style).update(index).update(binary).update(scalar).update(catalogues.map(({text}) => text).join()).digest('hex').slice(0, 16);
+const version = createHash('sha256').update(script).update(course).update(style).update(index).update(binary).update(scalar).update(catalogues.map(({text}) => text).join()).digest('hex').slice(0, 16);
 writeFileSync(`${out}/index.html`, index);
 writeFileSync(`${out}/style.css`, style);
 writeFileSync(`${out}/sonoplay.js`, script);
+writeFileSync(`${out}/course.js`, course);
 writeFileSync(`${out}/worker.js`, read('worker.js').replace('@VERSION@', version).replace('@WORDS@', catalogues.map(({file}) => file).join("', '")));
 writeFileSync(`${out}/sonoplay.wasm`, binary);
 writeFileSync(`${out}/sonoplay-scalar.wasm`, scalar);

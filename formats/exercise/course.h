@@ -3,7 +3,7 @@
 // A course: modules in order, each with a question before it, a short text, an expert to watch,
 // practice on one measure, a gate to the next module and a date at which it is checked again. Read
 // from TOML (course.toml, docs/procedures.md). What a trainee has of it is worked out from the
-// progress book (runtime/player/app/course_standing.h).
+// progress book (formats/scoring/course_standing.h).
 #pragma once
 
 #include <cmath>

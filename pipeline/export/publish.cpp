@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -11,9 +12,13 @@
 #include "formats/base/digest.h"
 #include "formats/bundle/case_bundle.h"
 #include "formats/exercise/case_exercises.h"
+#include "formats/exercise/course.h"
 #include "formats/files/atomic_file.h"
 #include "formats/text/json_reader.h"
+#include "formats/text/nearest_name.h"
+#include "formats/text/toml_reader.h"
 #include "pipeline/base/program_beside.h"
+#include "pipeline/export/course_package.h"
 
 namespace sonocase::pipeline::inline exporting {
 namespace {
@@ -53,9 +58,12 @@ Result<ReadCase> site_case(std::span<const std::uint8_t> given, const std::strin
         out.segments.push_back(
             hash_of(bytes.subspan(at, std::min(kSegmentBytes, bytes.size() - at))));
     out.preview = std::move(bundle.preview_png);
-    for (const Exercise& exercise : exercises)
+    for (const Exercise& exercise : exercises) {
         out.exercises.push_back({exercise.name, exercise.title, exercise.description,
-                                 exercise.mastery, texts_of_exercise(bundle, exercise.name)});
+                                 exercise.mastery, texts_of_exercise(bundle, exercise.name), {}});
+        for (const Sweep& sweep : exercise.sweeps)
+            out.exercises.back().sweeps.push_back(sweep.name);
+    }
     return read;
 }
 
@@ -67,9 +75,7 @@ std::vector<std::uint8_t> segment_list(const SiteCase& site) {
     return out;
 }
 
-std::string site_list_json(const std::vector<SiteCase>& cases,
-                           const std::string& xapi,
-                           const std::string& xapi_auth) {
+std::string site_list_json(const std::vector<SiteCase>& cases, const SiteNotes& notes) {
     using detail::Json;
     Json list = Json::array();
     for (const SiteCase& one : cases) {
@@ -105,8 +111,10 @@ std::string site_list_json(const std::vector<SiteCase>& cases,
     Json out = Json::object();
     out["format"] = "sonocase site";
     out["version"] = 2;
-    out["xapi"] = xapi;
-    if (!xapi_auth.empty()) out["xapi_auth"] = xapi_auth;
+    out["xapi"] = notes.xapi;
+    if (!notes.xapi_auth.empty()) out["xapi_auth"] = notes.xapi_auth;
+    if (!notes.course.empty()) out["course"] = notes.course;
+    if (!notes.package.empty()) out["package"] = notes.package;
     out["cases"] = std::move(list);
     return detail::json_text(out, false) + "\n";
 }
@@ -249,10 +257,10 @@ Result<Published> publish_page(const std::vector<ReadCase>& cases,
     SONOCASE_TRY(auto page, read_text_file(program + "/single.html"));
     SiteCase site = cases[0].site;
     site.preview.clear();
-    const std::string list =
-        "<script type=\"application/json\" id=\"site-list\">" +
-        inside_page(site_list_json({site}, options.xapi, authorization(options.xapi_key))) +
-        "</script>";
+    const std::string list = "<script type=\"application/json\" id=\"site-list\">" +
+                             inside_page(site_list_json(
+                                 {site}, {options.xapi, authorization(options.xapi_key), {}, {}})) +
+                             "</script>";
     const std::string data = "<script type=\"text/plain\" id=\"case-" + site.name + "\">" +
                              base64(cases[0].bytes) + "</script>";
     SONOCASE_TRY(const auto hosts, other_hosts(options));
@@ -285,9 +293,144 @@ Result<std::string> find_program() {
                  "build it with scripts/web, or name its folder with --program"};
 }
 
+namespace {
+
+struct SiteCourse {
+    Course course;
+    SiteFile file;  // its name changes with the content, so that no cache gives an older one
+};
+
+// What a module asks of a case that is not there, at its line of the course's file.
+std::optional<Error> missing_for(const CourseModule& module,
+                                 const TomlTable& table,
+                                 const std::vector<ReadCase>& cases) {
+    std::vector<std::string> titles, exercises;
+    const SiteCase::Entry* found = nullptr;
+    for (const ReadCase& one : cases) {
+        titles.push_back(one.site.title);
+        if (one.site.title != module.case_name) continue;
+        for (const SiteCase::Entry& entry : one.site.exercises) {
+            exercises.push_back(entry.name);
+            if (entry.name == module.exercise) found = &entry;
+        }
+    }
+    if (exercises.empty())
+        return Error{"the module '" + module.name + "' needs the case '" + module.case_name +
+                         "', which is not among those given",
+                     table.place("case"), suggest_name(module.case_name, titles)};
+    if (!found)
+        return Error{"the case '" + module.case_name + "' has no exercise '" + module.exercise +
+                         "', which the module '" + module.name + "' needs",
+                     table.place("exercise"), suggest_name(module.exercise, exercises)};
+    const auto& sweeps = found->sweeps;
+    if (!module.expert.empty() &&
+        std::find(sweeps.begin(), sweeps.end(), module.expert) == sweeps.end())
+        return Error{"the exercise '" + module.exercise + "' has no sweep '" + module.expert +
+                         "', which the module '" + module.name + "' shows as its expert",
+                     table.place("expert"), suggest_name(module.expert, sweeps)};
+    return std::nullopt;
+}
+
+Result<SiteCourse> read_course(const std::string& path, const std::vector<ReadCase>& cases) {
+    SONOCASE_TRY(const auto text, read_text_file(path));
+    SONOCASE_TRY(auto course, parse_course(text, path));
+    SONOCASE_TRY(const auto root, TomlTable::parse(text, path));
+    const std::vector<TomlTable> tables = root.tables("modules");
+    std::set<std::string> names;
+    for (std::size_t i = 0; i < course.modules.size(); ++i) {
+        if (auto missing = missing_for(course.modules[i], tables[i], cases)) return *missing;
+        if (!names.insert(plain_identifier(course.modules[i].name)).second)
+            return Error{
+                "two modules have the address '" + plain_identifier(course.modules[i].name) + "'",
+                tables[i].place("name"), "names that differ in more than spaces and signs"};
+    }
+    SiteCourse out{std::move(course), {"", {text.begin(), text.end()}}};
+    out.file.name = "course-" + digest_of(out.file.bytes).substr(0, 8) + ".toml";
+    return out;
+}
+
+// Faults of the options that a course and its packages need.
+Status check_course_options(const PublishOptions& options) {
+    for (const std::string& kind : options.packages) {
+        const auto& names = package_names();
+        if (std::find(names.begin(), names.end(), kind) == names.end())
+            return Error{"'" + kind + "' is no kind of package", "--package",
+                         suggest_name(kind, names)};
+    }
+    if (!options.packages.empty() && options.course.empty())
+        return Error{"a package holds a course, and none is given", "--package",
+                     "give --course FILE as well"};
+    if (options.single_file && !options.course.empty())
+        return Error{"one page holds one case and no course", "--single-file",
+                     "publish the course as a folder"};
+    return Done{};
+}
+
+struct SiteParts {
+    const std::vector<ReadCase>& cases;
+    const std::optional<SiteCourse>& course;
+    const std::string& program;
+    const PublishOptions& options;
+};
+
+// All files of a site, its page and its list of cases last. package: the kind that the site is part
+// of; empty: none.
+Result<std::vector<SiteFile>> files_of(const SiteParts& site, const std::string& package) {
+    const PublishOptions& options = site.options;
+    std::vector<SiteFile> out;
+    std::vector<SiteCase> list;
+    for (const ReadCase& one : site.cases) {
+        out.push_back({one.site.file, one.bytes});
+        out.push_back({one.site.file + ".segments", segment_list(one.site)});
+        if (!one.site.preview.empty()) out.push_back({one.site.name + ".png", one.site.preview});
+        list.push_back(one.site);
+    }
+    std::vector<std::string> names(std::begin(kProgramFiles), std::end(kProgramFiles));
+    std::error_code failed;
+    for (fs::directory_iterator it(site.program, failed), end; !failed && it != end;
+         it.increment(failed))
+        if (const std::string name = it->path().filename().string();
+            name.starts_with("words-") && name.ends_with(".json"))
+            names.push_back(name);
+    std::sort(names.begin(), names.end());
+    if (site.course) {
+        out.push_back(site.course->file);
+        names.push_back("course.js");
+    }
+    for (const std::string& name : names) {
+        SONOCASE_TRY(auto bytes, read_file(site.program + "/" + name));
+        out.push_back({name, std::move(bytes)});
+    }
+    SONOCASE_TRY(auto index, read_text_file(site.program + "/index.html"));
+    SONOCASE_TRY(auto hosts, other_hosts(options));
+    // A cmi5 platform names its record store when it opens the page.
+    if (package == "cmi5" && options.xapi.empty()) hosts += " https:";
+    if (!hosts.empty()) {
+        SONOCASE_TRY_DONE(replace_once(index, "connect-src 'self'", "connect-src 'self'" + hosts));
+    }
+    out.push_back({"index.html", {index.begin(), index.end()}});
+    const std::string json =
+        site_list_json(list, {options.xapi, authorization(options.xapi_key),
+                              site.course ? site.course->file.name : "", package});
+    out.push_back({"cases.json", {json.begin(), json.end()}});
+    return out;
+}
+
+std::string retention_warning(const Course& course) {
+    const auto asked = std::count_if(course.modules.begin(), course.modules.end(),
+                                     [](const CourseModule& m) { return m.retention_days > 0; });
+    if (asked == 0) return {};
+    return "Learning platforms keep a module that is passed: the packages do not ask for " +
+           std::to_string(asked) + " of " + std::to_string(course.modules.size()) +
+           " modules again after their retention_days; the site does.";
+}
+
+}  // namespace
+
 Result<Published> publish(const std::vector<std::string>& cases,
                           const std::string& site,
                           const PublishOptions& options) {
+    SONOCASE_TRY_DONE(check_course_options(options));
     std::string program = options.program_folder;
     if (program.empty()) {
         SONOCASE_TRY(auto found, find_program());
@@ -296,42 +439,27 @@ Result<Published> publish(const std::vector<std::string>& cases,
     Published out;
     SONOCASE_TRY(const auto read, read_cases(cases, out.warnings));
     if (options.single_file) return publish_page(read, program, site, options);
-
-    SONOCASE_TRY(auto index, read_text_file(program + "/index.html"));
-    SONOCASE_TRY(const auto hosts, other_hosts(options));
-    if (!hosts.empty()) {
-        SONOCASE_TRY_DONE(replace_once(index, "connect-src 'self'", "connect-src 'self'" + hosts));
+    std::optional<SiteCourse> course;
+    if (!options.course.empty()) {
+        SONOCASE_TRY(course, read_course(options.course, read));
     }
-    Status written = Done{};
-    const auto write = [&](const std::string& name, const auto& content) {
-        if (!written) return;
-        written = write_file(site + "/" + name, content);
-        if (written) out.files.push_back(site + "/" + name);
+    const SiteParts parts{read, course, program, options};
+    SONOCASE_TRY(const auto files, files_of(parts, ""));
+    const auto write = [&](const std::string& name, std::span<const std::uint8_t> bytes) -> Status {
+        SONOCASE_TRY_DONE(write_file(site + "/" + name, bytes));
+        out.files.push_back(site + "/" + name);
+        return Done{};
     };
-    std::vector<SiteCase> list;
-    for (const ReadCase& one : read) {
-        write(one.site.file, std::span<const std::uint8_t>(one.bytes));
-        write(one.site.file + ".segments", std::span<const std::uint8_t>(segment_list(one.site)));
-        if (!one.site.preview.empty())
-            write(one.site.name + ".png", std::span<const std::uint8_t>(one.site.preview));
-        list.push_back(one.site);
+    for (const SiteFile& file : files) SONOCASE_TRY_DONE(write(file.name, file.bytes));
+    for (const std::string& kind : options.packages) {
+        SONOCASE_TRY(auto packed, files_of(parts, kind));
+        packed.insert(packed.begin(), package_manifest(kind, course->course, packed));
+        SONOCASE_TRY(const auto zip, zip_of(packed));
+        SONOCASE_TRY_DONE(write(plain_identifier(course->course.name) + "-" + kind + ".zip", zip));
     }
-    std::vector<std::string> names(std::begin(kProgramFiles), std::end(kProgramFiles));
-    std::error_code failed;
-    for (fs::directory_iterator it(program, failed), end; !failed && it != end;
-         it.increment(failed))
-        if (const std::string name = it->path().filename().string();
-            name.starts_with("words-") && name.ends_with(".json"))
-            names.push_back(name);
-    std::sort(names.begin(), names.end());
-    for (const std::string& name : names) {
-        SONOCASE_TRY(const auto bytes, read_file(program + "/" + name));
-        write(name, std::span<const std::uint8_t>(bytes));
-    }
-    write("index.html", std::string_view(index));
-    write("cases.json",
-          std::string_view(site_list_json(list, options.xapi, authorization(options.xapi_key))));
-    if (!written) return written.error();
+    if (!options.packages.empty())
+        if (std::string words = retention_warning(course->course); !words.empty())
+            out.warnings.push_back(std::move(words));
     return out;
 }
 

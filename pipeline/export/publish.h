@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // A site for browsers: page, program and cases in a folder that any static host serves, or one page
-// with one case inside that opens from disk. cases.json lists the cases (docs/browser.md).
+// with one case inside that opens from disk. cases.json lists the cases (docs/browser.md). A site
+// may hold a course, which is then also packed for learning platforms (course_package.h).
 #pragma once
 
 #include <cstdint>
@@ -35,6 +36,7 @@ struct SiteCase {
         std::string name, title, description;
         int mastery = 3;                   // passes in a row
         std::vector<ExerciseTexts> texts;  // in other languages
+        std::vector<std::string> sweeps;  // names; not on the site's list
     };
     std::vector<Entry> exercises;
 };
@@ -51,10 +53,19 @@ Result<ReadCase> site_case(std::span<const std::uint8_t> bytes, const std::strin
 // The hashes of the segments, little-endian, eight bytes each.
 std::vector<std::uint8_t> segment_list(const SiteCase& site);
 
+struct SiteFile {
+    std::string name;  // in the site's folder
+    std::vector<std::uint8_t> bytes;
+};
+
+// What cases.json says besides the cases; empty: nothing of it.
+struct SiteNotes {
+    std::string xapi, xapi_auth;  // learning record store, and the Authorization that it takes
+    std::string course;           // the course's file
+    std::string package;          // the kind of package that the site is part of
+};
 // The text of cases.json.
-std::string site_list_json(const std::vector<SiteCase>& cases,
-                           const std::string& xapi,
-                           const std::string& xapi_auth = "");
+std::string site_list_json(const std::vector<SiteCase>& cases, const SiteNotes& notes);
 
 struct PublishOptions {
     std::string program_folder;  // what scripts/web built; empty: looked for, see find_program()
@@ -64,6 +75,9 @@ struct PublishOptions {
     std::string xapi_key;
     std::string poses;         // origin of a pose server, ws://HOST:PORT; empty: none
     bool single_file = false;  // one .html with exactly one case
+    // A course (formats/exercise/course.h) that the site shows; all its cases have to be given.
+    std::string course;
+    std::vector<std::string> packages;  // of package_names(), written beside the site
 };
 
 struct Published {
@@ -75,7 +89,8 @@ struct Published {
 // file. site: a folder, or the .html of --single-file. Files are renamed into place one by one, the
 // list of cases last, so that a site in use never names a file that is not there yet. Errors: a
 // bundle that cannot be read, two of the same name, no program, an address that is not https, a
-// file that cannot be written.
+// file that cannot be written; a course that cannot be read, or that needs a case, an exercise or
+// an expert which is not among the cases given.
 Result<Published> publish(const std::vector<std::string>& cases,
                           const std::string& site,
                           const PublishOptions& options = {});

@@ -83,6 +83,14 @@ int verb_publish(int argc, char** argv) {
         ->required();
     app.add_flag("--single-file", options.single_file,
                  "One .html with one case inside, which opens from disk");
+    app.add_option("--course", options.course,
+                   "Course that the site shows; all its cases have to be given")
+        ->type_name("FILE");
+    app.add_option("--package", options.packages,
+                   "Also the course as packages for learning platforms, beside the site: cmi5, "
+                   "scorm12, scorm2004, with commas between")
+        ->type_name("KIND,...")
+        ->delimiter(',');
     app.add_option("--xapi", options.xapi,
                    "Learning record store that takes the results; the page says so")
         ->type_name("ENDPOINT");

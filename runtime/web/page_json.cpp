@@ -2,12 +2,14 @@
 
 #include "runtime/web/page_json.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "formats/base/clinical_names.h"
 #include "formats/exercise/case_exercises.h"
 #include "formats/exercise/metric_table.h"
 #include "formats/scoring/attempt_result.h"
+#include "formats/scoring/course_standing.h"
 #include "formats/text/json_reader.h"
 #include "runtime/engine/image_presets.h"
 
@@ -203,6 +205,114 @@ std::string procedure_json(const PagePlayer& player) {
     out["wire_mm"] = s.wire_in ? s.wire_mm : 0.0;
     out["catheter_in"] = s.catheter_in;
     out["compressed_s"] = s.compressed_s;
+    return detail::json_text(out, false);
+}
+
+std::string course_json(const Course& course) {
+    Json out = Json::object();
+    out["name"] = course.name;
+    out["title"] = course.title;
+    out["text"] = course.text;
+    Json modules = Json::array();
+    for (const CourseModule& m : course.modules) {
+        Json one = Json::object();
+        one["name"] = m.name;
+        one["title"] = m.title;
+        one["text"] = m.text;
+        one["case"] = m.case_name;
+        one["exercise"] = m.exercise;
+        one["expert"] = m.expert;
+        one["question"] = m.question;
+        one["options"] = m.options;
+        one["answer"] = m.answer;
+        one["because"] = m.because;
+        one["measure"] = m.measure;
+        one["at_most"] = detail::json_number(m.at_most);
+        one["at_least"] = detail::json_number(m.at_least);
+        one["gate"]["passes_in_a_row"] = m.gate.passes_in_a_row;
+        one["gate"]["steady"] = m.gate.steady;
+        one["gate"]["exam"] = m.gate.exam;
+        one["retention_days"] = m.retention_days;
+        modules.push_back(std::move(one));
+    }
+    out["modules"] = std::move(modules);
+    return detail::json_text(out, false);
+}
+
+namespace {
+
+double part_of(const CourseGate& gate, const ModuleStanding& now) {
+    if (now.passed) return 1;
+    double part = 0;
+    if (gate.passes_in_a_row > 0) part = double(now.attempts.in_a_row) / gate.passes_in_a_row;
+    if (gate.steady) part = std::max(part, now.attempts.cusum / kSteadyCusum);
+    return std::clamp(part, 0.0, 1.0);
+}
+
+Json json_of_standing(const CourseModule& module, const ModuleStanding& now) {
+    Json one = Json::object();
+    one["option"] = now.option;
+    one["open"] = now.open;
+    one["passed"] = now.passed;
+    one["due"] = now.due;
+    one["passed_on"] = now.passed_on;
+    one["due_on"] = now.due_on;
+    one["kept_on"] = now.kept_on;
+    one["attempts"] = now.attempts.attempts;
+    one["in_a_row"] = now.attempts.in_a_row;
+    one["cusum"] = now.attempts.cusum;
+    one["cusum_needed"] = kSteadyCusum;
+    one["measured"] = detail::json_number(now.measured);
+    one["in_limits"] = now.in_limits;
+    one["part"] = part_of(module.gate, now);
+    return one;
+}
+
+}  // namespace
+
+Result<std::string> course_standing_json(const Course& course, std::string_view kept) {
+    constexpr std::int64_t kSeeds = std::int64_t{1} << 53;
+    detail::JsonFault fault{"the course's progress", {}};
+    Json parsed;
+    std::vector<ProgressEntry> history;
+    std::vector<CourseAnswer> answers;
+    std::string today;
+    if (detail::parse_json(kept, parsed, fault)) {
+        detail::JsonObject root(parsed, "", fault);
+        today = root.text("today");
+        for (detail::JsonObject& one : root.objects("attempts")) {
+            ProgressEntry entry;
+            entry.case_name = one.text("case");
+            entry.exercise = one.text("exercise");
+            entry.started = one.text("started");
+            entry.passed = one.flag_or("passed", false);
+            entry.exam = one.flag_or("exam", false);
+            entry.seed = static_cast<std::uint64_t>(one.integer_or("seed", 0, 0, kSeeds));
+            if (one.has("values")) {
+                detail::JsonObject values = one.object("values");
+                for (const std::string& name : values.keys())
+                    entry.metrics.push_back({name, values.number(name.c_str())});
+            }
+            history.push_back(std::move(entry));
+        }
+        std::vector<detail::JsonObject> given;
+        if (root.has("answers")) given = root.objects("answers");
+        for (detail::JsonObject& one : given) {
+            const std::string module = one.text("module");
+            answers.push_back(
+                {"", course.name, module, static_cast<int>(one.integer("option", 0, 3))});
+        }
+    }
+    if (fault.error) return *fault.error;
+    const CourseStanding standing = course_standing(course, history, answers, today);
+    Json out = Json::object();
+    out["passed"] = standing.passed;
+    out["due"] = standing.due;
+    out["next"] = standing.next;
+    Json modules = Json::array();
+    for (std::size_t i = 0; i < course.modules.size(); ++i)
+        modules.push_back(json_of_standing(course.modules[i], standing.modules[i]));
+    out["modules"] = std::move(modules);
     return detail::json_text(out, false);
 }
 

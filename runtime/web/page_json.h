@@ -4,7 +4,9 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
+#include "formats/exercise/course.h"
 #include "runtime/tracking/guided_start.h"
 #include "runtime/web/page_player.h"
 
@@ -31,5 +33,18 @@ std::string guide_json(const GuidedStart& guide);
 // "question": {item, words, options} or null, "tray": [{kind, index, amount, words}],
 // "complications": [words], and what the hands have done}. "{}" without a procedure.
 std::string procedure_json(const PagePlayer& player);
+
+// {"name", "title", "text", "modules": [{"name", "title", "text", "case", "exercise", "expert",
+// "question", "options", "answer", "because", "measure", "at_most", "at_least", "gate":
+// {"passes_in_a_row", "steady", "exam"}, "retention_days"}]}.
+std::string course_json(const Course& course);
+
+// How a trainee stands in a course, by what a browser or a learning platform has kept: {"today",
+// "attempts": [{"case", "exercise", "started", "passed", "exam", "seed", "values": {measure:
+// number}}] oldest first, "answers": [{"module", "option"}]}. Returns {"passed", "due", "next",
+// "modules": [{"option", "open", "passed", "due", "passed_on", "due_on", "kept_on", "attempts",
+// "in_a_row", "cusum", "cusum_needed", "measured", "in_limits", "part"}]}; part: how much of the
+// gate has been reached, 1 once it is passed. Error: what was kept is damaged.
+Result<std::string> course_standing_json(const Course& course, std::string_view kept);
 
 }  // namespace sonocase::runtime::inline web

@@ -224,6 +224,7 @@ Status PagePlayer::choose_exercise(int index, int side_px) {
         return made;
     }
     session_.reset();
+    watched_.reset();
     hands_ = std::make_unique<MouseTracker>(Skin(*bundle_), exercise);
     return Done{};
 }
@@ -258,9 +259,26 @@ void PagePlayer::put_tools(double now_s, const TrackerReading& reading) {
     engine_->observe(reading, true);
 }
 
+Status PagePlayer::watch(const std::string& sweep, double now_s) {
+    assert(!session_);
+    for (const Sweep& one : exercise_in_use().sweeps) {
+        if (one.name != sweep) continue;
+        watched_ = std::make_unique<ScriptedSweep>(one, Skin(*bundle_), false);
+        engine_->begin_session(now_s);
+        kept_count_ = 0;
+        return Done{};
+    }
+    return Error{"the exercise has no expert '" + sweep + "'", exercise_in_use().name,
+                 "expected the name of one of its sweeps"};
+}
+
 FrameStatus PagePlayer::frame(double now_s, const ImageSettings& settings) {
     TrackerReading reading;
-    if (hands_->poll(now_s, reading)) engine_->observe(reading, false);
+    if (hands_->poll(now_s, reading) && !watched_) engine_->observe(reading, false);
+    if (watched_) {
+        if (watched_->poll(now_s, reading)) engine_->observe(reading, false);
+        if (watched_->health().phase == TrackerPhase::ended) watched_.reset();
+    }
     if (bundle_.blocks()) bundle_.blocks()->forget_awaited();
     const FrameStatus status = engine_->frame(now_s, settings, pixels_);
     FrameRecord record = engine_->last();
@@ -320,6 +338,7 @@ Status PagePlayer::start_attempt(const std::string& trainee,
         }
         hands_ = std::make_unique<MouseTracker>(Skin(*bundle_), *drawn_);
     }
+    watched_.reset();
     session_ = std::make_unique<PageSession>(*bundle_, *engine_, trainee, started, seed);
     engine_->begin_session(now_s);
     kept_count_ = 0;

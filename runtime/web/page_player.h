@@ -23,6 +23,7 @@
 #include "runtime/imaging/doppler/doppler_view.h"
 #include "runtime/imaging/truth/frame_truth.h"
 #include "runtime/tracking/mouse_tracker.h"
+#include "runtime/tracking/scripted_sweep.h"
 #include "runtime/web/load_plan.h"
 
 namespace sonocase::runtime::inline web {
@@ -167,6 +168,13 @@ class PagePlayer {
     // A pose from elsewhere (a tracker, a test) instead of the hands', until the hands move again.
     void put_tools(double now_s, const TrackerReading& reading);
 
+    // Plays a sweep of the exercise from its beginning, as an expert is watched; hands do nothing
+    // meanwhile. Ends with it, with end_watching() or with an attempt. Only without an attempt.
+    // Error: the exercise has no sweep of that name.
+    Status watch(const std::string& sweep, double now_s);
+    void end_watching() { watched_.reset(); }
+    bool watching() const { return watched_ != nullptr; }
+
     // The picture of now; observed by the attempt, if one runs.
     FrameStatus frame(double now_s, const ImageSettings& settings);
     // A kept picture of the last 20 seconds, `back` pictures before the newest, 0 to kept() - 1.
@@ -225,6 +233,7 @@ class PagePlayer {
     std::unique_ptr<ScanEngine> engine_;
     PageDoppler doppler_;
     std::unique_ptr<MouseTracker> hands_;
+    std::unique_ptr<ScriptedSweep> watched_;
     std::unique_ptr<PageSession> session_;
     std::vector<FrameRecord> kept_;  // ring
     std::size_t kept_next_ = 0, kept_count_ = 0;

@@ -129,7 +129,7 @@ Standing ClassRecords::standing(const std::string& trainee, const ClassExercise&
     std::vector<ProgressEntry> own;
     for (const ProgressEntry& entry : entries)
         if (entry.trainee == trainee) own.push_back(entry);
-    return runtime::standing(own, exercise.case_name, exercise.name, kMastery);
+    return sonocase::standing(own, exercise.case_name, exercise.name, kMastery);
 }
 
 std::vector<double> ClassRecords::curve(const std::string& trainee,

@@ -21,8 +21,7 @@
 #include <vector>
 
 #include "formats/progress_book/progress_book.h"
-#include "runtime/player/app/course_progress.h"
-#include "runtime/player/app/standing.h"
+#include "formats/scoring/course_standing.h"
 
 namespace sonocase::runtime::inline player_app {
 

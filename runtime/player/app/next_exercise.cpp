@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
+#include "formats/scoring/course_standing.h"
 #include "formats/scoring/draw_attempt.h"
-#include "runtime/player/app/standing.h"
 
 namespace sonocase::runtime::inline player_app {
 namespace {

@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "formats/exercise/metric_table.h"
+#include "formats/scoring/course_standing.h"
 #include "formats/scoring/draw_attempt.h"
 #include "runtime/player/app/exam_set.h"
 #include "runtime/player/ui/pages.h"

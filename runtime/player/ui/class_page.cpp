@@ -7,6 +7,7 @@
 #include <map>
 #include <set>
 
+#include "formats/scoring/course_standing.h"
 #include "runtime/player/app/class_steps.h"
 #include "runtime/player/ui/pages.h"
 #include "runtime/player/ui/parts/layout.h"

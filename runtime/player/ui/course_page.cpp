@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "formats/exercise/metric_table.h"
+#include "formats/scoring/course_standing.h"
 #include "runtime/player/session/clock.h"
 #include "runtime/player/ui/pages.h"
 #include "runtime/player/ui/parts/layout.h"

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "formats/scoring/course_standing.h"
 #include "runtime/player/app/next_exercise.h"
 #include "runtime/player/app/settings.h"
 #include "runtime/player/ui/pages.h"

@@ -10,7 +10,7 @@ import {inside_page, load_list, open_bytes} from './source.js';
 import {begin_words, choose_language, exercise_texts, language_in_use, languages, missing_words, t} from './words.js';
 
 const $ = (id) => document.getElementById(id);
-const kPages = ['start', 'scan', 'after', 'scores'];
+const kPages = ['start', 'course', 'scan', 'after', 'scores'];
 
 class App {
     constructor() {
@@ -35,7 +35,7 @@ class App {
         click('scores-back', () => this.show('start'));
         click('scores-remove', () => this.remove_scores());
         click('to-cases', () => this.to_cases());
-        click('after-cases', () => this.show('start'));
+        click('after-cases', () => this.show_first());
         click('again', () => this.choose_exercise(this.exercise));
         click('save-recording', () => this.save(this.attempt, 'recording'));
         click('save-scores', () => this.save(this.attempt, 'scores'));
@@ -43,7 +43,7 @@ class App {
         click('browse', () => $('file').click());
         $('file').addEventListener('change', () => this.open_file($('file').files[0]));
         $('trainee').value = trainee();
-        $('trainee').addEventListener('change', () => set_trainee($('trainee').value.trim()));
+        $('trainee').addEventListener('change', () => { set_trainee($('trainee').value.trim()); this.course?.trainee_changed(); });
         addEventListener('dragover', (e) => { e.preventDefault(); $('drop').classList.add('over'); });
         addEventListener('dragleave', () => $('drop').classList.remove('over'));
         addEventListener('drop', (e) => {
@@ -72,8 +72,18 @@ class App {
         if (!wanted) this.show_cases();
         if (asked.get('case') && !wanted) this.say(new PlainError(t('This site has no case named {}.', asked.get('case'))));
         if (wanted) await this.open(wanted, asked.get('exercise'));
+        const course = this.open_course().catch((error) => this.say(error));
         if (wanted) this.show_cases();  // its pictures need not come before that of the case
         await ready;
+        await course;
+    }
+
+    // Its part of the page is fetched where a site has a course.
+    async open_course() {
+        if (!this.list.course) return;
+        const {CourseView} = await import('./course.js');
+        this.course = new CourseView(this);
+        await this.course.begin(this.list);
     }
 
     // The program, compiled while it arrives; once for all cases.
@@ -101,9 +111,17 @@ class App {
     show(name) {
         for (const page of kPages) $(page).hidden = page !== name;
         document.body.classList.toggle('scanning', name === 'scan');
-        if (name !== 'scan') this.scan.hide();
+        if (name !== 'scan') {
+            this.scan.hide();
+            this.course?.scan_left();
+        }
         if (name === 'start' && this.list) this.show_cases();
         scrollTo(0, 0);
+    }
+    // A learning platform's trainee came for a module, not for the cases.
+    show_first() {
+        if (this.course?.single()) this.course.show();
+        else this.show('start');
     }
     say(error) {
         console.error(error);
@@ -280,7 +298,7 @@ class App {
     async to_cases() {
         if (this.scan.values.attempt && !await this.ask(t('Leave this attempt? It will not be kept.'), t('Stay'), t('Leave'))) return;
         this.core.calls.drop_attempt();
-        this.show('start');
+        this.show_first();
     }
     help() { if (!$('help').open) $('help').showModal(); }
     download(...what) { download(...what); }
@@ -344,8 +362,10 @@ class App {
             recording: finished.recording, score_text: finished.score_text};
         this.show_after(finished.score);
         this.kept = [...this.kept ?? [], this.attempt];
+        const sending = this.send([['completed', this.attempt, finished.score], ['scored', this.attempt, finished.score]]);
+        this.course?.attempt_done(this.attempt, finished.score);
         const kept = await keep_attempt(this.attempt);
-        const sent = await this.send([['completed', this.attempt, finished.score], ['scored', this.attempt, finished.score]]);
+        const sent = await sending;
         $('after-notice').textContent = [
             kept ? '' : t('This browser keeps nothing: save recording and scores now.'),
             words_of_sending(sent),
@@ -353,6 +373,7 @@ class App {
         this.settled = this.started;  // kept and sent, or said that it was not
     }
     send(which) {
+        if (this.course?.takes(which)) return Promise.resolve({waiting: 0, refused: 0, status: 200});
         const published = this.list?.xapi ?? '';
         const launch = launch_of(location.search, published);
         return send_statements(launch?.endpoint ?? published,
@@ -436,16 +457,18 @@ class App {
     async remove_scores() {
         if (!await this.ask(t('Remove all attempts and recordings from this browser?'), t('Keep'), t('Remove'))) return;
         await remove_attempts();
+        this.course?.remove();
         await this.show_scores();
     }
     frame_shown() {
         this.arriving_case?.pump();
+        this.course?.frame_shown();
         if (this.scan.complete) this.work_offline();
     }
     // The service worker fetches page and program again: not before the first picture is there.
     work_offline() {
         const waits = this.scan.shown() && !this.scan.complete;
-        if (waits || this.registered || !('serviceWorker' in navigator) || !location.protocol.startsWith('http') || !isSecureContext) return;
+        if (waits || this.registered || this.list?.package || !('serviceWorker' in navigator) || !location.protocol.startsWith('http') || !isSecureContext) return;
         this.registered = true;
         navigator.serviceWorker.register('worker.js').catch(() => {});  // without it the page works online
     }

@@ -219,6 +219,23 @@ export class Core {
         return state.steps ? state : null;
     }
     act({kind, index, amount}) { return this.calls.act(kind, index, amount) === 1; }
+    // Plays a sweep of the exercise; calls.watching() tells whether it still runs.
+    watch(sweep, now_s) {
+        this.set_text(sweep);
+        this.check(this.calls.watch(now_s));
+    }
+    // The course of page_json.h, in a language ("en", "de").
+    open_course(toml, language) {
+        this.set_text(`${language}\n${toml}`);
+        this.check(this.calls.open_course());
+        return JSON.parse(this.text());
+    }
+    // How a trainee stands in that course; kept: as page_json.h has it.
+    stand_in_course(kept) {
+        this.set_text(JSON.stringify(kept));
+        this.check(this.calls.stand_in_course());
+        return JSON.parse(this.text());
+    }
     // {recording: bytes of an .igs.mha, score_text: JSON text, score}
     finish_attempt() {
         this.check(this.calls.finish_attempt());

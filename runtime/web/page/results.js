@@ -117,7 +117,7 @@ export function launch_of(search, published) {
 }
 
 // A UUID of version 4, also in pages that are not secure, where crypto.randomUUID is missing.
-function new_id() {
+export function new_id() {
     if (crypto.randomUUID) return crypto.randomUUID();
     const b = crypto.getRandomValues(new Uint8Array(16));
     b[6] = (b[6] & 0x0f) | 0x40;

@@ -8,7 +8,7 @@ const kFiles = ['./', 'index.html', 'style.css', 'sonoplay.js', 'sonoplay.wasm',
 
 addEventListener('install', (e) => {
     skipWaiting();
-    e.waitUntil(caches.open(kCache).then((cache) => cache.addAll(kFiles)));
+    e.waitUntil(fill());
 });
 addEventListener('activate', (e) => e.waitUntil((async () => {
     for (const name of await caches.keys()) {
@@ -21,6 +21,13 @@ addEventListener('fetch', (e) => {
     if (e.request.method !== 'GET' || url.origin !== location.origin || url.pathname.endsWith('.sonocase')) return;
     e.respondWith(answer(e.request, url));
 });
+
+async function fill() {
+    const cache = await caches.open(kCache);
+    await cache.addAll(kFiles);
+    const {course} = await (await cache.match('cases.json')).json();
+    if (course) await cache.addAll([course, 'course.js']);
+}
 
 async function answer(request, url) {
     const cache = await caches.open(kCache);

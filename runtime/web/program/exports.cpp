@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "formats/base/digest.h"
+#include "formats/exercise/course.h"
 #include "runtime/imaging/doppler/doppler_picture.h"
 #include "runtime/web/page_json.h"
 #include "runtime/web/page_player.h"
@@ -79,6 +80,7 @@ struct Page {
     std::array<double, 16> doppler{};
     std::string result;                // result_json() of the attempt that ended last
     std::optional<GuidedStart> guide;  // runs
+    Course course;
 };
 Page page;
 
@@ -421,6 +423,36 @@ SONOCASE_EXPORT(finish_attempt) int finish_attempt() {
     page.bytes = std::move(finished->recording);
     page.text = std::move(finished->score_json);
     page.result = result_json(finished->score);
+    return 1;
+}
+
+// text(): a sweep of the exercise, which plays from now on (page_player.h).
+SONOCASE_EXPORT(watch) int watch(double now_s) {
+    return answer(page.player->watch(page.text, now_s));
+}
+SONOCASE_EXPORT(watching) int watching() {
+    return page.player && page.player->watching();
+}
+SONOCASE_EXPORT(end_watching) void end_watching() {
+    page.player->end_watching();
+}
+
+// A course. text(): language, a line break, the course as TOML; on success the course in that
+// language (page_json.h).
+SONOCASE_EXPORT(open_course) int open_course() {
+    const std::size_t end = std::min(page.text.find('\n'), page.text.size());
+    auto course = parse_course(std::string_view(page.text).substr(end), "course.toml");
+    if (!course) return answer(course.error());
+    page.course = std::move(*course);
+    page.text = course_json(course_in(page.course, page.text.substr(0, end)));
+    return 1;
+}
+// text(): what is kept of a trainee; on success how the trainee stands in that course
+// (page_json.h).
+SONOCASE_EXPORT(stand_in_course) int stand_in_course() {
+    auto standing = course_standing_json(page.course, page.text);
+    if (!standing) return answer(standing.error());
+    page.text = std::move(*standing);
     return 1;
 }
 

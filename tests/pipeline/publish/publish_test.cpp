@@ -27,8 +27,8 @@ class Publish : public ::testing::Test {
         };
         put("program/index.html", "<meta content=\"connect-src 'self'; img-src 'self'\">");
         put("program/single.html", "<meta content=\"connect-src 'none'\"><!--LIST--><!--CASES-->");
-        for (const char* name :
-             {"style.css", "sonoplay.js", "sonoplay.wasm", "sonoplay-scalar.wasm", "worker.js"})
+        for (const char* name : {"style.css", "sonoplay.js", "course.js", "sonoplay.wasm",
+                                 "sonoplay-scalar.wasm", "worker.js"})
             put(std::string("program/") + name, name);
         CaseBundle bundle = sonocase::testing::small_case();
         bundle.manifest.case_name = "Round </script> body";
@@ -156,6 +156,93 @@ TEST_F(Publish, what_cannot_be_published_is_refused_and_leaves_no_list) {
     options_.program_folder = folder_.path() + "/nowhere";
     EXPECT_FALSE(publish({case_path("round body")}, site(), options_));
     EXPECT_FALSE(fs::exists(site("/cases.json")));
+}
+
+constexpr const char* kCourse = R"(name = "First needles"
+title = "Needles & <more>"
+[texts.de]
+title = "Erste Nadeln"
+[[modules]]
+name = "look"
+text = "Look first."
+case = "Round </script> body"
+exercise = "scan"
+expert = "along"
+gate = { passes_in_a_row = 2 }
+retention_days = 30
+[[modules]]
+name = "in plane"
+text = "Then the needle."
+case = "Round </script> body"
+exercise = "scan"
+gate = { steady = true }
+)";
+
+TEST_F(Publish, a_course_is_on_the_site_and_in_packages_that_are_the_same_each_time) {
+    options_.course = folder_.write("course.toml", kCourse);
+    options_.packages = {"cmi5", "scorm12", "scorm2004"};
+    const auto published = publish({case_path("round body")}, site(), options_);
+    ASSERT_TRUE(published) << published.error().message();
+    const std::string list = text_of(site("/cases.json"));
+    const std::string name = "course-" + digest_of(*read_file(options_.course)).substr(0, 8);
+    EXPECT_NE(list.find("\"course\":\"" + name + ".toml\""), std::string::npos) << list;
+    EXPECT_EQ(list.find("package"), std::string::npos) << list;
+    EXPECT_EQ(text_of(site("/" + name + ".toml")), kCourse);
+    ASSERT_EQ(published->warnings.size(), 1u);
+    EXPECT_NE(published->warnings[0].find("1 of 2 modules"), std::string::npos);
+    EXPECT_EQ(text_of(site("/index.html")).find("https:"), std::string::npos);
+    ASSERT_TRUE(publish({case_path("round body")}, site("2"), options_));
+    for (const char* kind : {"cmi5", "scorm12", "scorm2004"}) {
+        const std::string file = std::string("/First-needles-") + kind + ".zip";
+        const auto zip = read_file(site(file));
+        ASSERT_TRUE(zip) << file;
+        EXPECT_EQ(*zip, *read_file(site("2") + file));
+    }
+}
+
+TEST_F(Publish, a_course_that_lacks_something_is_refused_at_its_line) {
+    const auto refused = [&](const std::string& was, const std::string& is) {
+        std::string text = kCourse;
+        text.replace(text.find(was), was.size(), is);
+        options_.course = folder_.write("course.toml", text);
+        const auto published = publish({case_path("round body")}, site("-wrong"), options_);
+        EXPECT_FALSE(published) << is;
+        return published ? std::string() : published.error().message();
+    };
+    const auto says = [](const std::string& text, const char* words) {
+        EXPECT_NE(text.find(words), std::string::npos) << text;
+    };
+    std::string text = refused("Round </script> body", "Neck");
+    says(text, "course.toml:8");
+    says(text, "'look' needs the case 'Neck'");
+    text = refused("exercise = \"scan\"", "exercise = \"scam\"");
+    says(text, "course.toml:9");
+    says(text, "did you mean 'scan'?");
+    text = refused("expert = \"along\"", "expert = \"across\"");
+    says(text, "course.toml:10");
+    text = refused("gate = { steady = true }", "gate = { steadily = true }");
+    says(text, "course.toml:18");
+    text = refused("name = \"in plane\"", "name = \"look\"");
+    says(text, "given twice");
+    EXPECT_FALSE(fs::exists(site("-wrong") + "/cases.json"));
+}
+
+TEST_F(Publish, packages_need_a_course_and_a_kind_that_exists) {
+    options_.packages = {"cmi5"};
+    auto published = publish({case_path("round body")}, site(), options_);
+    ASSERT_FALSE(published);
+    EXPECT_NE(published.error().message().find("--course"), std::string::npos);
+    options_.course = folder_.write("course.toml", kCourse);
+    options_.packages = {"scorm13"};
+    published = publish({case_path("round body")}, site(), options_);
+    ASSERT_FALSE(published);
+    EXPECT_NE(published.error().message().find("scorm12"), std::string::npos);
+    options_.packages = {};
+    options_.single_file = true;
+    EXPECT_FALSE(publish({case_path("round body")}, site(".html"), options_));
+    options_.single_file = false;
+    options_.course = folder_.path() + "/nowhere.toml";
+    EXPECT_FALSE(publish({case_path("round body")}, site(), options_));
 }
 
 }  // namespace

@@ -309,5 +309,82 @@ TEST(PageJson, names_what_the_page_shows) {
     EXPECT_NE(json.find("\"mark_mm\":"), std::string::npos) << json;
 }
 
+// The expert of a course's module: the sweep moves the tools, not the hands.
+TEST(PagePlayer, an_expert_is_watched_and_hands_take_over_afterwards) {
+    const auto player = open_small();
+    ASSERT_FALSE(player->watch("nobody", 0));
+    EXPECT_FALSE(player->watching());
+    ASSERT_TRUE(player->watch("along", 10));
+    player->frame(10, {});
+    const double from_y = player->engine().last().tools.mannequin_from_probe.translation.y;
+    player->hands().slide(0, 20);
+    player->frame(11.9, {});
+    const ToolPoses& tools = player->engine().last().tools;
+    EXPECT_NEAR(tools.mannequin_from_probe.translation.y - from_y, 57, 2);  // 30 mm each second
+    EXPECT_TRUE(tools.has_needle);
+    EXPECT_TRUE(player->watching());
+    player->frame(12.1, {});
+    EXPECT_FALSE(player->watching());
+    // An attempt ends it as well, and a new exercise.
+    ASSERT_TRUE(player->watch("along", 20));
+    ASSERT_TRUE(player->start_attempt("", "2026-01-31T12:00:00Z", 21));
+    EXPECT_FALSE(player->watching());
+    player->drop_attempt();
+    ASSERT_TRUE(player->watch("along", 30));
+    ASSERT_TRUE(player->choose_exercise(0, 128));
+    EXPECT_FALSE(player->watching());
+}
+
+// The gate is the window's: the page hands over what it has kept.
+TEST(PageCourse, stands_as_the_windows_rule_says) {
+    const auto course = parse_course(R"(name = "short"
+[[modules]]
+name = "look"
+text = "Look."
+case = "cylinder"
+exercise = "scan"
+expert = "along"
+practice = { measure = "needle_in_beam_fraction", at_least = 0.6 }
+gate = { passes_in_a_row = 3, steady = true }
+retention_days = 30
+[[modules]]
+name = "exam"
+text = "Show it."
+case = "cylinder"
+exercise = "scan"
+gate = { passes_in_a_row = 1, exam = true }
+)",
+                                     "course.toml");
+    ASSERT_TRUE(course) << course.error().message();
+    EXPECT_NE(course_json(*course).find("\"at_most\":null,\"at_least\":0.6"), std::string::npos);
+    const auto stands = [&](const std::string& attempts) {
+        return course_standing_json(*course,
+                                    R"({"today":"2026-03-05","attempts":[)" + attempts + "]}");
+    };
+    const auto attempt = [](int day, bool passed, bool exam = false) {
+        return R"({"case":"cylinder","exercise":"scan","started":"2026-02-0)" +
+               std::to_string(day) + R"(T10:00:00Z",)" +
+               R"("values":{"needle_in_beam_fraction":0.7},"passed":)" +
+               (passed ? "true" : "false") + R"(,"exam":)" + (exam ? "true}" : "false}");
+    };
+    auto now = stands("");
+    ASSERT_TRUE(now) << now.error().message();
+    EXPECT_NE(now->find(R"("passed":0,"due":0,"next":0)"), std::string::npos) << *now;
+    now = stands(attempt(1, true) + "," + attempt(2, true));
+    EXPECT_NE(now->find(R"("in_a_row":2)"), std::string::npos) << *now;
+    EXPECT_NE(now->find(R"("part":0.666)"), std::string::npos) << *now;
+    now = stands(attempt(1, true) + "," + attempt(2, true) + "," + attempt(3, true));
+    EXPECT_NE(now->find(R"("passed_on":"2026-02-03","due_on":"2026-03-05")"), std::string::npos)
+        << *now;
+    EXPECT_NE(now->find(R"("due":1,"next":0)"), std::string::npos) << *now;
+    EXPECT_EQ(now->find(R"("passed":2)"), std::string::npos) << "practice opens no exam's gate";
+    now = stands(attempt(3, true, true));
+    EXPECT_NE(now->find(R"("passed":1,"due":0,"next":0)"), std::string::npos) << *now;
+    for (const char* damaged :
+         {"", "[]", "{}", R"({"today":"x","attempts":[{"case":1}]})",
+          R"({"today":"x","attempts":[],"answers":[{"module":"look","option":9}]})"})
+        EXPECT_FALSE(course_standing_json(*course, damaged)) << damaged;
+}
+
 }  // namespace
 }  // namespace sonocase::runtime

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/app/standing.h"
+#include "formats/scoring/course_standing.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "formats/exercise/metric_table.h"
+#include "formats/scoring/course_standing.h"
 #include "formats/scoring/draw_attempt.h"
 
 namespace sonocase::runtime {

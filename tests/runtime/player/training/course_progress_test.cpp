@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/app/course_progress.h"
+#include "runtime/player/app/find_courses.h"
 
 #include <gtest/gtest.h>
 
+#include "formats/scoring/course_standing.h"
 #include "formats/scoring/draw_attempt.h"
 #include "runtime/player/app/class_records.h"
 #include "support/temporary_folder.h"

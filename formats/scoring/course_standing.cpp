@@ -1,21 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/app/course_progress.h"
+#include "formats/scoring/course_standing.h"
 
 #include <algorithm>
 #include <chrono>
 #include <climits>
+#include <cmath>
 #include <cstdio>
-#include <filesystem>
 
-#include "formats/files/atomic_file.h"
 #include "formats/scoring/draw_attempt.h"
-#include "runtime/player/app/case_cards.h"
 
-namespace sonocase::runtime::inline player_app {
+namespace sonocase {
 namespace {
 
-namespace fs = std::filesystem;
+double metric_of(const ProgressEntry& entry, const std::string& name) {
+    for (const Metric& metric : entry.metrics) {
+        if (metric.name == name) return metric.value;
+    }
+    return NAN;
+}
 
 // The day of an ISO 8601 time, moved on by some days; empty: it does not begin with a date.
 std::string day_of(const std::string& time, int later = 0) {
@@ -72,34 +75,50 @@ ModuleStanding standing_in(const CourseModule& module,
 
 }  // namespace
 
-std::vector<Course> find_courses(const std::string& given, Notices& notices) {
-    std::vector<fs::path> files;
-    if (!given.empty()) files.emplace_back(given);
-    for (const fs::path& folder : case_folders()) {
-        std::error_code failed;
-        std::vector<fs::path> found;
-        for (fs::directory_iterator it(folder, failed), end; !failed && it != end;
-             it.increment(failed)) {
-            const std::string name = it->path().filename().string();
-            if (name == "course.toml" || name.ends_with(".course.toml"))
-                found.push_back(it->path());
-        }
-        std::sort(found.begin(), found.end());
-        files.insert(files.end(), found.begin(), found.end());
+void add_trend(std::span<const ProgressEntry> earlier,
+               const SessionScore& score,
+               AttemptResult& result) {
+    if (result.trend_metric.empty()) return;
+    for (const ProgressEntry& entry : earlier) {
+        const double value = metric_of(entry, result.trend_metric);
+        if (std::isfinite(value)) result.trend.push_back(value);
     }
-    std::vector<Course> courses;
-    for (const fs::path& file : files) {
-        const auto text = read_text_file(file.string());
-        auto course = text ? parse_course(*text, file.string()) : Result<Course>(text.error());
-        if (!course) {
-            notices.error(course.error().message());
-            continue;
+    const double now = score.value(result.trend_metric);
+    if (std::isfinite(now)) result.trend.push_back(now);
+    if (result.trend.size() > kMaxTrend)
+        result.trend.erase(result.trend.begin(),
+                           result.trend.end() - static_cast<std::ptrdiff_t>(kMaxTrend));
+}
+
+Standing standing(std::span<const ProgressEntry> entries,
+                  const std::string& case_name,
+                  const std::string& exercise,
+                  int mastery) {
+    Standing result;
+    for (const ProgressEntry& entry : entries) {
+        if (entry.case_name != case_name || entry.exercise != exercise) continue;
+        ++result.attempts;
+        result.passes += entry.passed;
+        constexpr double kSkilled = 0.1, kUnskilled = 0.3;  // shares of failures
+        if (!entry.passed) {
+            result.in_a_row = 0;
+            result.cusum = std::max(0.0, result.cusum + std::log(kSkilled / kUnskilled));
+        } else if (attempt_difficulty(entry.seed) >= 0) {
+            ++result.in_a_row;
+            result.cusum += std::log((1 - kSkilled) / (1 - kUnskilled));
         }
-        const bool known = std::any_of(courses.begin(), courses.end(),
-                                       [&](const Course& c) { return c.name == course->name; });
-        if (!known) courses.push_back(std::move(*course));
+        if (!result.steady && result.cusum >= kSteadyCusum) {
+            result.steady = true;
+            result.steady_at = entry.started;
+        }
+        if (!result.mastered && result.in_a_row >= std::max(mastery, 1)) {
+            result.mastered = true;
+            result.mastered_at = entry.started;
+        }
+        const double mm = metric_of(entry, "final_tip_to_target_mm");
+        if (std::isfinite(mm) && (result.best_mm < 0 || mm < result.best_mm)) result.best_mm = mm;
     }
-    return courses;
+    return result;
 }
 
 CourseStanding course_standing(const Course& course,
@@ -127,4 +146,4 @@ CourseStanding course_standing(const Course& course,
     return now;
 }
 
-}  // namespace sonocase::runtime::inline player_app
+}  // namespace sonocase

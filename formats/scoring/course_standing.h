@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What earlier attempts say: how a trainee stands with an exercise, and the trend of a score.
+// How a trainee stands with an exercise and in a course (formats/exercise/course.h), by the
+// attempts that were kept: one rule for window, class and page.
 #pragma once
 
+#include <cmath>
 #include <span>
 #include <string>
+#include <vector>
 
-#include "formats/progress_book/progress_book.h"
+#include "formats/exercise/course.h"
 #include "formats/scoring/attempt_result.h"
+#include "formats/scoring/progress_entry.h"
 
-namespace sonocase::runtime::inline player_app {
+namespace sonocase {
 
 inline constexpr std::size_t kMaxTrend = 12;  // attempts
 
@@ -42,4 +46,28 @@ Standing standing(std::span<const ProgressEntry> entries,
                   const std::string& exercise,
                   int mastery);
 
-}  // namespace sonocase::runtime::inline player_app
+struct ModuleStanding {
+    int option = -1;         // answered; -1: not yet
+    bool open = false;       // the modules before it are passed
+    Standing attempts;       // those that count for the gate
+    double measured = NAN;   // the practised measure, in the last attempt
+    bool in_limits = false;  // `measured` is
+    bool passed = false;
+    // Days as YYYY-MM-DD; empty: none.
+    std::string passed_on, due_on, kept_on;
+    bool due = false;  // the day has come, and no pass since
+};
+
+struct CourseStanding {
+    std::vector<ModuleStanding> modules;  // # modules
+    int passed = 0, due = 0;
+    int next = -1;  // first the module that is due, then the first not passed; -1: none
+};
+
+// history: of the trainee, oldest first. today: as it begins an ISO 8601 time.
+CourseStanding course_standing(const Course& course,
+                               std::span<const ProgressEntry> history,
+                               std::span<const CourseAnswer> answers,
+                               const std::string& today);
+
+}  // namespace sonocase
