@@ -239,6 +239,7 @@ TEST(PageJson, gives_the_texts_of_other_languages_whole) {
 // What the page after an attempt shows is what the window's shows.
 TEST(PageJson, says_values_limits_and_advice_of_an_attempt) {
     SessionScore score;
+    score.passed = false;
     score.pass_marks = {{"final_tip_to_target_mm", 4.23, 9, -INFINITY, true},
                         {"tip_in_view_at_advance_fraction", NAN, INFINITY, 0.7, false}};
     score.metrics = {{"elapsed_time_s", 107.4}, {"insertions", NAN}};
