@@ -4,6 +4,10 @@
 
 #include <unistd.h>
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 #include <algorithm>
 #include <fstream>
 #include <limits>
@@ -37,6 +41,12 @@ double machine_memory_mb() {
 
 double memory_limit_mb() {
     return std::min(lowest_mb, machine_memory_mb());
+}
+
+void give_memory_back() {
+#ifdef __GLIBC__
+    malloc_trim(0);
+#endif
 }
 
 MemoryLimit::MemoryLimit(double mb) : before_mb_(lowest_mb) {

@@ -13,6 +13,10 @@ double machine_memory_mb();
 // The same, or the lowest limit that a MemoryLimit sets, if that is smaller.
 double memory_limit_mb();
 
+// Gives memory that has been freed, but that the allocator keeps, back to the system, so that what
+// one stage took does not count beside what the next one takes.
+void give_memory_back();
+
 // Lowers memory_limit_mb() of the process during its lifetime; an object made later must be
 // destroyed earlier. 0 changes nothing.
 class MemoryLimit {

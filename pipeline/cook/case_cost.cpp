@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <thread>
 
 #include "formats/pathology/pathology_kinds.h"
@@ -35,12 +36,16 @@ double nodes_between_slices(Vector3 spacing_mm, double voxels) {
     return voxels / 1e6 * std::max(2.0, std::round(h[2] / h[1]));
 }
 
-// The map as it will be imported; of the analytic torso a coarse one, whose boxes are as large.
+// The map as it will be imported; of an analytic body one of a million voxels, whose boxes and
+// surfaces are as large.
 // Organ meshes are not turned into voxels twice.
 Result<LabelVolume> labels_of(const Recipe& recipe) {
-    if (recipe.inputs.analytic)
-        return sample_analytic_torso(analytic_torso_grid({4, 4, 4}, recipe.inputs.torso.body),
-                                     recipe.inputs.torso.body);
+    if (recipe.inputs.analytic) {
+        const AnalyticBody& body = recipe.inputs.torso.body;
+        const Grid coarse = analytic_torso_grid({10, 10, 10}, body);
+        const double h = 10 * std::cbrt(static_cast<double>(coarse.voxel_count()) / 1e6);
+        return sample_analytic_torso(analytic_torso_grid({h, h, h}, body), body);
+    }
     if (is_mesh_source(recipe.resolve(recipe.inputs.labels)))
         return Error{"organ meshes have no voxels yet", recipe.inputs.labels, ""};
     SONOCASE_TRY(auto imported, import_inputs(recipe, {}, {}));
@@ -48,11 +53,10 @@ Result<LabelVolume> labels_of(const Recipe& recipe) {
 }
 
 // Millions. Round a label: of its box in the map; how far the warp stretches it is not known.
-double region_voxels(const Recipe& recipe, const RegionRequest& region) {
+double region_voxels(const RegionRequest& region, const LabelVolume* labels) {
     Vector3 e = region.size_mm;
     if (!region.label.empty()) {
-        const auto labels = labels_of(recipe);
-        if (!labels) return 0;
+        if (labels == nullptr) return 0;
         const Box3 box = box_of_label(*labels, region.label, region.margin_mm);
         if (box.empty()) return 0;
         e = box.extent();
@@ -60,67 +64,92 @@ double region_voxels(const Recipe& recipe, const RegionRequest& region) {
     return e.x * e.y * e.z / std::pow(region.voxel_mm, 3) / 1e6;
 }
 
-// Faces between voxels of different labels, air left out, for one voxel of the map: distances are
-// kept in blocks along the surfaces.
-double surface_share(const AnalyticBody& body) {
-    const LabelVolume map = sample_analytic_torso(analytic_torso_grid({4, 4, 4}, body), body);
+// Millions of faces between voxels of different labels, if the map's voxels had this size.
+double surfaces_of(const LabelVolume& map, Vector3 spacing_mm) {
     const Int3 n = map.grid.size;
+    const Vector3 own = map.grid.spacing_mm, h = spacing_mm;
+    const double area_x = own.y * own.z / (h.y * h.z), area_y = own.x * own.z / (h.x * h.z),
+                 area_z = own.x * own.y / (h.x * h.y);
+    const auto row = static_cast<std::size_t>(n.x), plane = row * static_cast<std::size_t>(n.y);
     double faces = 0;
     std::size_t at = 0;
     for (int k = 0; k < n.z; ++k)
         for (int j = 0; j < n.y; ++j)
             for (int i = 0; i < n.x; ++i, ++at) {
-                const auto here = map.voxels[at];
-                const auto differs = [&](bool inside, std::size_t step) {
-                    const auto next = inside ? map.voxels[at + step] : here;
-                    return next != here && next != 0 && here != 0;
-                };
-                faces += differs(i + 1 < n.x, 1);
-                faces += differs(j + 1 < n.y, static_cast<std::size_t>(n.x));
-                faces += differs(k + 1 < n.z, static_cast<std::size_t>(n.x) * n.y);
+                const std::uint8_t here = map.voxels[at];
+                faces += area_x * (i + 1 < n.x && map.voxels[at + 1] != here);
+                faces += area_y * (j + 1 < n.y && map.voxels[at + row] != here);
+                faces += area_z * (k + 1 < n.z && map.voxels[at + plane] != here);
             }
-    return faces / static_cast<double>(map.voxels.size());
+    return faces / 1e6;
+}
+
+// The spacing of the nodes on which thick slices are interpolated; else that of the map.
+Vector3 node_spacing_mm(Vector3 spacing_mm, double between_slices, double voxels) {
+    if (between_slices == 0) return spacing_mm;
+    double& thick = spacing_mm.z >= std::max(spacing_mm.x, spacing_mm.y) ? spacing_mm.z
+                    : spacing_mm.y >= spacing_mm.x                       ? spacing_mm.y
+                                                                         : spacing_mm.x;
+    thick *= voxels / 1e6 / between_slices;
+    return spacing_mm;
 }
 
 }  // namespace
 
 CaseSize case_size(const Recipe& recipe) {
+    constexpr double kCounted = 30;  // million voxels: reading more takes seconds
     CaseSize size;
+    const std::string path = recipe.resolve(recipe.inputs.labels);
+    Vector3 spacing_mm;
+    double voxels = 0;
     if (recipe.inputs.analytic) {
         const AnalyticInput& in = recipe.inputs.torso;
         const Grid grid = analytic_torso_grid({in.voxel_mm, in.voxel_mm, in.slice_mm}, in.body);
-        const auto voxels = static_cast<double>(grid.voxel_count());
-        size.label_voxels = voxels / 1e6;
-        // A phantom has few surfaces; the law is that of a torso's organs.
-        if (in.body.tubes || in.body.neck_seed != 0)
-            size.surface_share = std::min(1.0, surface_share(in.body) / surface_share({}));
-        size.interpolated_nodes = nodes_between_slices(grid.spacing_mm, voxels);
-    } else if (is_mesh_source(recipe.resolve(recipe.inputs.labels))) {
-        if (const auto grid = mesh_inputs_grid(recipe))
-            size.label_voxels = size.mesh_voxels = static_cast<double>(grid->voxel_count()) / 1e6;
+        voxels = static_cast<double>(grid.voxel_count());
+        spacing_mm = grid.spacing_mm;
+    } else if (is_mesh_source(path)) {
+        if (const auto grid = mesh_inputs_grid(recipe)) {
+            voxels = static_cast<double>(grid->voxel_count());
+            size.mesh_voxels = voxels / 1e6;
+        }
     } else {
-        const VolumeSize labels = size_in_headers(recipe.resolve(recipe.inputs.labels));
+        const VolumeSize labels = size_in_headers(path);
+        voxels = static_cast<double>(labels.voxels);
+        spacing_mm = labels.spacing_mm;
         size.label_mb = static_cast<double>(labels.bytes) / 1e6;
         // Its voxels in its own type, as 16-bit numbers, and those on the grid of the labels.
         if (!recipe.inputs.scan.empty())
             size.label_mb +=
                 (static_cast<double>(size_in_headers(recipe.resolve(recipe.inputs.scan)).bytes) *
                      2 +
-                 4 * static_cast<double>(labels.voxels)) /
+                 4 * voxels) /
                 1e6;
-        size.label_voxels = static_cast<double>(labels.voxels) / 1e6;
-        size.interpolated_nodes =
-            nodes_between_slices(labels.spacing_mm, static_cast<double>(labels.voxels));
     }
+    size.label_voxels = voxels / 1e6;
+    size.interpolated_nodes = nodes_between_slices(spacing_mm, voxels);
     const ResampleOptions& resample = recipe.settings.of<ResampleOptions>();
+    const bool seeks_label = resample.region && !resample.region->label.empty();
+    std::optional<LabelVolume> map;
+    if (recipe.inputs.analytic || (size.label_voxels <= kCounted && size.mesh_voxels == 0) ||
+        seeks_label)
+        if (auto labels = labels_of(recipe)) map = std::move(*labels);
+    if (map) {
+        if (!recipe.inputs.analytic) spacing_mm = map->grid.spacing_mm;
+        size.surfaces =
+            surfaces_of(*map, node_spacing_mm(spacing_mm, size.interpolated_nodes, voxels));
+    } else {
+        size.surfaces = CaseSize::kTorsoSurfaces * std::cbrt(size.nodes() * size.nodes());
+    }
     if (const auto volume = cooked_volume_mm3(recipe))
         size.cooked_voxels = *volume / std::pow(resample.voxel_mm, 3) / 1e6;
-    if (resample.region) size.region_voxels = region_voxels(recipe, *resample.region);
+    if (resample.region)
+        size.region_voxels = region_voxels(*resample.region, map ? &*map : nullptr);
     for (const PathologyRequest& request : recipe.settings.of<PathologyOptions>().requests) {
         const PathologyKind* kind = find_pathology_kind(request.kind);
         const bool pool = kind != nullptr && kind->shape == LesionShape::pool;
         (pool ? size.pools : size.lesions) += 1;
     }
+    size.texture_edge = recipe.settings.of<TextureStageOptions>().bank.edge;
     return size;
 }
 
@@ -150,7 +179,7 @@ MemoryNeed memory_need(const Recipe& recipe, double limit_mb) {
         const double all = cost.memory_mb(need.size);
         const double mb =
             all <= limit ? all
-                         : std::max<double>(cost.min_memory_mb(need.size), std::min(all, limit));
+                         : std::max<double>(cost.memory_mb(need.size, true), std::min(all, limit));
         if (mb <= need.mb) continue;
         need.mb = mb;
         need.stage = stage.stage;
@@ -204,7 +233,8 @@ double probe_processor_seconds() {
 }  // namespace
 
 BuildTime build_time(const CaseSize& size, int texture_edge, double speed, int threads) {
-    const double cooked = size.cooked_voxels, mapped = size.label_voxels * size.surface_share;
+    const double cooked = size.cooked_voxels,
+                 mapped = size.label_voxels * std::min(1.0, size.surface_share());
     BuildTime time;
     time.processor_s =
         speed * (kFixedS + kTextureS * std::pow(texture_edge / 64.0, 3) +

@@ -35,12 +35,6 @@ std::optional<Error> check_goal(const std::vector<PlannedStage>& plan,
 
 }  // namespace
 
-double seconds_of(const CookResult& cooked) {
-    double sum = 0;
-    for (const StageRun& run : cooked.stages) sum += run.report.seconds;
-    return sum;
-}
-
 Result<CookResult> cook_case(const Recipe& recipe,
                              const CookOptions& options,
                              const Progress& progress) {

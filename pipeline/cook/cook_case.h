@@ -34,9 +34,6 @@ struct CookResult {
     std::string digest;            // of the result it stopped at; empty at the last stage
 };
 
-// Sum over all stages, as they ran when their results were made.
-double seconds_of(const CookResult& cooked);
-
 // Stopping early needs a cache, through which results are handed on. Errors besides those of the
 // stages: the case has no such stage; inputs that have changed since plan_key was made.
 Result<CookResult> cook_case(const Recipe& recipe,

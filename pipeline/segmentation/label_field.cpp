@@ -380,7 +380,8 @@ void LabelField::measure(const std::vector<int>& layers) {
     }
     const std::size_t label_count = this->label_count();
     const float beyond = static_cast<float>(distance_.limit_mm());
-    // Each thread takes the next piece until all are taken, and keeps its scratch space.
+    // Each thread takes the next piece until all are taken, and keeps its scratch space, but not
+    // that of a large piece through the many small ones, while the values fill.
     std::atomic<std::size_t> next{0};
     parallel_for(pieces.size(), 1, [&](std::size_t, std::size_t) {
         SparseBox phi;
@@ -388,10 +389,17 @@ void LabelField::measure(const std::vector<int>& layers) {
         std::vector<float> copied(step_mm_ > 0 ? phi_ : 0);
         NodeBlocks needed;
         needed.edge = block_edge();
+        std::size_t kept = 0;  // nodes of the largest piece that the scratch space has served
         for (std::size_t p = next++; p < pieces.size(); p = next++) {
             const Piece& piece = *pieces[p];
             const bool own = piece.distance >= label_count;
             const auto l = static_cast<std::uint8_t>(piece.distance % label_count);
+            if (piece.part.count() < kept / 2) {
+                phi = {};
+                scratch = {};
+                kept = 0;
+            }
+            kept = std::max(kept, piece.part.count());
             phi.begin(piece.part, beyond, beyond);
             if (!piece.part.empty()) {
                 needed.first.clear();

@@ -104,7 +104,7 @@ StageDescriptor flow_stage() {
     stage.codec = codec_of(kFlow, encode, decode);
     stage.reports = reports_of(kFlow);
     stage.share = 0.03;
-    stage.cost = {.threads = 1, .base_mb = 240, .per_cooked_voxel = 3};
+    stage.cost = {.threads = 1, .per_cooked_voxel = 3};
     stage.verb = verb();
     return stage;
 }

@@ -280,11 +280,7 @@ StageDescriptor import_stage() {
         return assign_tissues(recipe, labels);
     };
     stage.share = 0.03;
-    stage.cost = {.threads = 1,
-                  .base_mb = 240,
-                  .per_label_mb = 1.2,
-                  .per_label_voxel = 4,
-                  .per_mesh_voxel = 18.5};
+    stage.cost = {.threads = 1, .per_label_mb = 1.2, .per_label_voxel = 4, .per_mesh_voxel = 20};
     stage.verb = verb();
     return stage;
 }

@@ -37,6 +37,8 @@ struct OptionSweep {
     std::vector<std::string> values;  // cheapest first; the default is among them
     std::string trades;               // the error that more time reduces
     std::string why_not_monotone;     // known reasons why more time need not mean less error
+    // Why the default stays where a value beats it in a suite.
+    std::string why_default = {};
 };
 
 struct Option {

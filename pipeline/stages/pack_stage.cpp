@@ -100,7 +100,7 @@ StageDescriptor pack_stage() {
     stage.run = run;
     stage.reports = reports_of(kCase);
     stage.share = 0.05;
-    stage.cost = {.threads = 1, .base_mb = 240, .per_cooked_voxel = 4.5, .per_region_voxel = 1.5};
+    stage.cost = {.threads = 1, .per_cooked_voxel = 3.8, .per_region_voxel = 1.5};
     return stage;
 }
 

@@ -240,7 +240,7 @@ StageDescriptor pathology_stage() {
     stage.codec = label_codec(kLabels);
     stage.reports = reports_of(kLabels);
     stage.share = 0.05;
-    stage.cost = {.threads = 2, .base_mb = 240, .per_cooked_voxel = 8, .per_pool_voxel = 14};
+    stage.cost = {.threads = 2, .per_cooked_voxel = 2.5, .per_pool_voxel = 5.3};
     return stage;
 }
 

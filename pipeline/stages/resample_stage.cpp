@@ -58,10 +58,12 @@ void add_shape(OptionsOf<ResampleOptions>& options) {
         .number(
             "volume_iterations", [](auto& o) { return &o.volume_iterations; }, 0, 50, "",
             "Newton steps that keep each label's volume; 0: not kept")
-        .sweep({"smooth",
-                {"0", "1", "2", "4", "8"},
-                "volume lost by smoothing",
-                "converged after a few steps"})
+        .sweep(
+            {"smooth",
+             {"0", "1", "2", "4", "8"},
+             "volume lost by smoothing",
+             "converged after a few steps",
+             "it keeps the volume of each label, of which a mean over all surfaces shows little"})
         .toggle(
             "follow_shift", [](auto& o) { return &o.follow_shift; },
             "blend oblique vessels along their shift")
@@ -83,10 +85,13 @@ void add_shape(OptionsOf<ResampleOptions>& options) {
         .number(
             "snap_vx", [](auto& o) { return &o.snap_vx; }, 0, 0.5, "voxels",
             "most that surfaces move onto quadrics, which are short to store; 0: none")
-        .sweep({"smooth",
-                {"0", "0.03", "0.07", "0.15"},
-                "surfaces inside voxels, against the size of the bundle",
-                "bricks where no quadric is that near are kept as they are"});
+        .sweep(
+            {"smooth",
+             {"0", "0.03", "0.07", "0.15"},
+             "surfaces inside voxels, against the size of the bundle",
+             "bricks where no quadric is that near are kept as they are",
+             "the size of the bundle, which this page does not measure, falls by it; beyond 0.07 "
+             "voxels surfaces of thin layers begin to show it"});
 }
 
 void add_paper(OptionsOf<ResampleOptions>& options) {
@@ -198,6 +203,27 @@ std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests&) {
          region->size_mm.x, region->size_mm.y, region->size_mm.z, region->margin_mm})};
 }
 
+// Memory goes by surfaces, since distances are held near them alone. Two threads measure the
+// distances to two unions of labels, each on its box, or on parts of it where it has more than ten
+// million nodes (label_field.cpp); then voxels are sampled.
+double more_mb(const CaseSize& size, bool least) {
+    constexpr double kLarge = 30;  // million nodes from which distances are 16-bit numbers
+    constexpr double kHeld = 250, kMeasured = 415;  // for a million faces
+    // Share of the faces that lie in two parts of boxes.
+    constexpr double kWhole = 11.5, kInParts = 0.4;
+    // Of thick slices, for a node of the box of the body: numbers of every node, not of those near
+    // a surface alone.
+    constexpr double kDense = 18, kDenseNodes = 7.5;
+    const double cooked_mb = 3 * size.cooked_voxels, nodes = size.nodes();
+    if (nodes > kLarge)
+        return std::min(1.0, size.surface_share()) * (505 + (least ? 8 : 12) * size.label_voxels) +
+               cooked_mb;
+    const double held_mb = kHeld * size.surfaces,
+                 measured_mb = kMeasured * size.surfaces * (nodes > kWhole ? kInParts : 1) +
+                               kDense * std::min(kDenseNodes, size.interpolated_nodes);
+    return 2 * size.label_voxels + held_mb + std::max(measured_mb, 2 * nodes + cooked_mb);
+}
+
 StageVerb verb() {
     StageVerb verb;
     verb.files = {label_input(kCtLabels, "Labels in the ct frame: .labels or any label map"),
@@ -241,15 +267,7 @@ StageDescriptor resample_stage() {
     stage.codec = label_codec(kLabels);
     stage.reports = reports_of(kLabels);
     stage.share = 0.4;
-    stage.cost = {.threads = 2,
-                  .base_mb = 250,
-                  .per_label_voxel = 65,
-                  .per_cooked_voxel = 3,
-                  .large_mb = 420,
-                  .per_large_voxel = 12,
-                  .per_streamed_voxel = 8,
-                  .per_interpolated_node = 86,
-                  .per_region_voxel = 1.5};
+    stage.cost = {.threads = 2, .base_mb = 165, .per_region_voxel = 1.5, .more_mb = more_mb};
     stage.verb = verb();
     return stage;
 }

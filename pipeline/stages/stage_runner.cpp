@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "formats/base/digest.h"
+#include "pipeline/base/memory_limit.h"
 #include "pipeline/base/stopwatch.h"
 
 namespace sonocase::pipeline::inline stages {
@@ -190,6 +191,7 @@ Status StageRunner::make(std::size_t i, bool damaged, const Progress& progress) 
     const double seconds = watch.seconds();
     processor_seconds_ = processor_seconds() - processor_before;
     slot.value = std::move(value);
+    give_memory_back();
     std::vector<std::string> notes;
     if (damaged) notes.push_back("a damaged cache entry was made again");
     if (cache_.enabled() && stage.codec) {

@@ -20,24 +20,12 @@ std::vector<StageReport> without_seconds(std::vector<StageReport> reports) {
     return reports;
 }
 
-int StageCost::memory_mb(const CaseSize& size) const {
-    double voxels_mb = per_label_voxel * size.label_voxels;
-    if (large_mb > 0)
-        voxels_mb = size.surface_share *
-                    std::min(voxels_mb, large_mb + per_large_voxel * size.label_voxels);
-    const double apart_mb = per_interpolated_node * std::min(10.0, size.interpolated_nodes);
-    return static_cast<int>(std::ceil(
-        base_mb +
-        std::max(apart_mb,
-                 per_label_mb * size.label_mb + voxels_mb + per_cooked_voxel * size.cooked_voxels +
-                     (size.pools > 0 ? per_pool_voxel * size.cooked_voxels : 0) +
-                     per_region_voxel * size.region_voxels + per_mesh_voxel * size.mesh_voxels)));
-}
-
-int StageCost::min_memory_mb(const CaseSize& size) const {
-    StageCost streamed = *this;
-    if (per_streamed_voxel > 0) streamed.per_large_voxel = per_streamed_voxel;
-    return streamed.memory_mb(size);
+int StageCost::memory_mb(const CaseSize& size, bool least) const {
+    return static_cast<int>(
+        std::ceil(base_mb + per_label_mb * size.label_mb + per_label_voxel * size.label_voxels +
+                  (per_cooked_voxel + per_pool_voxel * size.pools) * size.cooked_voxels +
+                  per_region_voxel * size.region_voxels + per_mesh_voxel * size.mesh_voxels +
+                  (more_mb != nullptr ? more_mb(size, least) : 0)));
 }
 
 const StageDescriptor* StageTable::find(const std::string& stage) const {

@@ -16,8 +16,10 @@
 // docs/extending.md has a worked example.
 #pragma once
 
+#include <algorithm>
 #include <any>
 #include <cassert>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <functional>
@@ -161,29 +163,37 @@ struct CaseSize {
     double cooked_voxels = 0;  // millions, without those of a region
     // Millions of nodes between thick slices that are interpolated; 0: none are.
     double interpolated_nodes = 0;
+    // Millions of faces between nodes of different labels; of a torso where nobody has counted.
+    double surfaces = 0;
     double region_voxels = 0;       // millions
     double mesh_voxels = 0;         // those of label_voxels that organ meshes become
     double lesions = 0, pools = 0;  // numbers of pathologies: of a place, and of free fluid
-    double surface_share = 1;  // surfaces of the map for its voxels, over those of a torso, [0, 1]
+    double texture_edge = 64;       // voxels, of the solid textures
+
+    // Millions, in the box of the body, which fills little of that of organ meshes.
+    double nodes() const { return std::max(label_voxels - 0.4 * mesh_voxels, interpolated_nodes); }
+    // Surfaces over those of a torso on as many nodes, which go with its area.
+    double surface_share() const {
+        return surfaces > 0 ? surfaces / (kTorsoSurfaces * std::cbrt(nodes() * nodes())) : 1;
+    }
+    static constexpr double kTorsoSurfaces = 0.2116;
 };
 
 // Cores that a stage's job asks a build farm for, and its peak memory in MB: base + a * MB of the
 // label file + b * million voxels of the label map (+ b' where meshes become it) + c * million
-// cooked voxels + d * million voxels of the region; for a stage that works through large maps piece
-// by piece, the voxels count at most large_mb + e * million voxels. docs/farm.md has the
-// measurements.
+// cooked voxels + d * million voxels of the region + what the stage says itself. docs/farm.md has
+// the measurements.
 struct StageCost {
     int threads = 1;
-    double base_mb = 240, per_label_mb = 0, per_label_voxel = 0, per_cooked_voxel = 0;
-    double large_mb = 0, per_large_voxel = 0;  // large_mb 0: no map is worked through in pieces
-    double per_streamed_voxel = 0;  // in place of per_large_voxel where memory is short; 0: as that
-    double per_interpolated_node = 0;  // beside base_mb and no other, up to ten million nodes
+    double base_mb = 180;  // of which some 160 are the program's libraries
+    double per_label_mb = 0, per_label_voxel = 0, per_cooked_voxel = 0;
     double per_region_voxel = 0;
     double per_mesh_voxel = 0;
-    double per_pool_voxel = 0;  // beside per_cooked_voxel, where free fluid is painted
+    double per_pool_voxel = 0;  // beside per_cooked_voxel, for each pool of free fluid
+    // What no sum of these is, MB; `least`: what suffices where memory is short. Null: nothing.
+    double (*more_mb)(const CaseSize& size, bool least) = nullptr;
 
-    int memory_mb(const CaseSize& size) const;
-    int min_memory_mb(const CaseSize& size) const;  // what suffices where memory is short
+    int memory_mb(const CaseSize& size, bool least = false) const;
 };
 
 // A flag of a stage's verb that says what a recipe's [inputs] would.

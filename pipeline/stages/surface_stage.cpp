@@ -109,7 +109,7 @@ StageDescriptor surface_stage() {
     stage.codec = codec_of(kSkin, encode, decode);
     stage.reports = reports_of(kSkin);
     stage.share = 0.02;
-    stage.cost = {.threads = 1, .base_mb = 240, .per_label_voxel = 4};
+    stage.cost = {.threads = 1, .per_label_voxel = 4};
     stage.verb = verb();
     return stage;
 }

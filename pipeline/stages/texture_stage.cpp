@@ -5,6 +5,8 @@
 // The descriptor has no verb: pipeline/verbs/verb_texture.cpp does more than this stage.
 #include "pipeline/stages/texture_stage.h"
 
+#include <cmath>
+
 #include "formats/bundle/stage_files.h"
 #include "formats/files/thread_jobs.h"
 #include "pipeline/stages/built_in_stages.h"
@@ -61,6 +63,11 @@ Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
     return StageValue::of(kTextures, std::move(file));
 }
 
+// The transforms of the largest cubes that are matched to each other.
+double more_mb(const CaseSize& size, bool) {
+    return 31 * std::pow(size.texture_edge / 64, 3);
+}
+
 Bytes encode(const TextureFile& file) {
     TextureFile copy = file;
     copy.reports = without_seconds(copy.reports);
@@ -96,7 +103,7 @@ StageDescriptor texture_stage() {
     stage.codec = codec_of(kTextures, encode, decode);
     stage.reports = reports_of(kTextures);
     stage.share = 0.1;
-    stage.cost = {.threads = 1, .base_mb = 240, .per_cooked_voxel = 3.5};
+    stage.cost = {.threads = 1, .per_cooked_voxel = 1.6, .more_mb = more_mb};
     return stage;
 }
 

@@ -94,14 +94,16 @@ Suite calibrate_suite() {
          "degrees",
          "full angle that the tool is tilted over",
          "how well the tip is determined",
-         "tilting further costs the fit no time"},
+         "tilting further costs the fit no time",
+         "a wider cone is hard on the hand, not on the fit"},
         {"calibrate.trials",
          {"10", "50", "100", "400", "1600"},
          "400",
          "",
          "random starts of the robust fit",
          "the chance that outliers win",
-         "with one outlier in ten, few starts are enough"},
+         "with one outlier in ten, few starts are enough",
+         "one reading in ten is off here; a hand that slips spoils a third of them"},
     };
     suite.named = {
         {TrialRole::paper,

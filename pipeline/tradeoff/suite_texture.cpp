@@ -28,9 +28,9 @@ Result<Measured> measure_bank(const Settings& settings) {
         SONOCASE_TRY(const auto example, prepare_example(synthetic_example(name)));
         spec.name = name;
         spec.examples = {synthetic_example(name)};
-        const Stopwatch watch;
+        const double before = processor_seconds();
         const auto made = make_solid_texture(spec);
-        sum.seconds += watch.seconds();
+        sum.seconds += processor_seconds() - before;
         if (!made) return made.error();
         const TextureQuality quality = measure_texture(*made, example.image);
         sum.error += quality.distance.grain / std::size(kExamples);

@@ -19,7 +19,8 @@ std::vector<Knob> knobs_of(const StageTable& table, const std::string& suite) {
                 if (sweep.suite == suite)
                     knobs.push_back({option.name(), sweep.values,
                                      option_value(option, group->defaults), option.unit,
-                                     option.meaning, sweep.trades, sweep.why_not_monotone});
+                                     option.meaning, sweep.trades, sweep.why_not_monotone,
+                                     sweep.why_default});
     return knobs;
 }
 

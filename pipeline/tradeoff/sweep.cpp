@@ -62,6 +62,41 @@ std::vector<bool> pareto_front(const std::vector<Trial>& trials) {
     return front;
 }
 
+namespace {
+
+const Knob* find_knob(const Suite& suite, const std::string& key) {
+    for (const Knob& knob : suite.knobs) {
+        if (knob.key == key) return &knob;
+    }
+    return nullptr;
+}
+
+}  // namespace
+
+std::vector<Beaten> beaten_standard(const Suite& suite,
+                                    const std::vector<Trial>& trials,
+                                    double noise) {
+    constexpr double kEqual = 1.02;
+    std::vector<Beaten> beaten;
+    const auto standard = std::find_if(
+        trials.begin(), trials.end(), [](const Trial& t) { return t.role == TrialRole::standard; });
+    if (standard == trials.end() || !(standard->error > 0)) return beaten;
+    for (const Trial& t : trials) {
+        const double error = t.error / standard->error, seconds = t.seconds / standard->seconds;
+        if (!(error <= kEqual && seconds <= kEqual)) continue;
+        if (!(error < 1 - noise || seconds < 1 - noise)) continue;
+        std::string why;
+        if (t.role == TrialRole::knob || t.role == TrialRole::pair) {
+            const Knob* knob = find_knob(suite, t.settings.front().key);
+            if (knob != nullptr) why = knob->why_standard;
+        }
+        for (const NamedSettings& named : suite.named)
+            if (named.name == t.name) why = named.why_not_standard;
+        beaten.push_back({t, why});
+    }
+    return beaten;
+}
+
 CurveVerdict judge_curve(const std::vector<Trial>& trials, double noise) {
     std::vector<Trial> by_time = trials;
     std::stable_sort(by_time.begin(), by_time.end(),
@@ -183,13 +218,6 @@ Result<std::vector<Trial>> parse_trials_csv(const std::string& text, const std::
 }
 
 namespace {
-
-const Knob* find_knob(const Suite& suite, const std::string& key) {
-    for (const Knob& knob : suite.knobs) {
-        if (knob.key == key) return &knob;
-    }
-    return nullptr;
-}
 
 // Every step-th value, with both ends and the standard one.
 std::vector<std::string> values_of(const Knob& knob, std::size_t step) {

@@ -49,14 +49,16 @@ struct Knob {
     std::string standard;
     std::string unit;  // "" for a count
     std::string meaning;
-    std::string trades;            // the error that it lowers
-    std::string why_not_monotone;  // known reasons why more time need not mean less error
+    std::string trades;             // the error that it lowers
+    std::string why_not_monotone;   // known reasons why more time need not mean less error
+    std::string why_standard = {};  // why the standard one stays where another value beats it
 };
 
 struct NamedSettings {
     TrialRole role = TrialRole::preset;
     std::string name;
     Settings settings;
+    std::string why_not_standard = {};  // where they beat the standard ones
 };
 
 // One stage against its truth. `measure` runs the stage once; it may keep what it prepared before.
@@ -79,6 +81,17 @@ Settings parse_settings(const std::string& text);     // reads what settings_tex
 
 // True where no other trial of the same suite and body is both faster and better. # trials.
 std::vector<bool> pareto_front(const std::vector<Trial>& trials);
+
+// Settings of one suite and body that beat the standard one: no worse in error and seconds (2 %),
+// and better in one of them by more than `noise` (relative). With the reason why the standard one
+// stays nevertheless; empty: none is known. Pairs of knobs count by the first of them.
+struct Beaten {
+    Trial by;
+    std::string why_standard;
+};
+std::vector<Beaten> beaten_standard(const Suite& suite,
+                                    const std::vector<Trial>& trials,
+                                    double noise);
 
 // Whether the error of a knob's curve falls as its seconds rise. Differences below `noise`
 // (relative) do not count. Trials of one knob in the order of its values.

@@ -85,20 +85,6 @@ std::vector<Trial> trials_of_knob(const std::vector<Trial>& trials, const Knob& 
     return own;
 }
 
-// A cheaper setting whose error is no worse than the standard one's, if the sweep found one.
-const Trial* cheaper_than_standard(const std::vector<Trial>& trials, double noise) {
-    const auto standard = std::find_if(
-        trials.begin(), trials.end(), [](const Trial& t) { return t.role == TrialRole::standard; });
-    if (standard == trials.end()) return nullptr;
-    const Trial* best = nullptr;
-    for (const Trial& t : trials) {
-        if (!(t.error <= standard->error * 1.02) || !(t.seconds < standard->seconds * (1 - noise)))
-            continue;
-        if (best == nullptr || t.seconds < best->seconds) best = &t;
-    }
-    return best;
-}
-
 std::string curve_text(const Knob& knob, const CurveVerdict& verdict) {
     if (verdict.monotone) return "more time, less error (within noise)";
     const std::string reason = knob.why_not_monotone.empty()
@@ -151,12 +137,20 @@ std::string trial_rows(const std::vector<Trial>& trials) {
     return rows;
 }
 
-std::string cheaper_text(const Suite& suite, const Trial* cheaper) {
-    if (cheaper == nullptr) return html().filled("none_cheaper", {});
-    return html().filled("cheaper", {{"settings", escaped_html(settings_text(cheaper->settings))},
-                                     {"error", number(cheaper->error)},
-                                     {"unit", escaped_html(suite.error_unit)},
-                                     {"seconds", number(cheaper->seconds)}});
+std::string why_standard(const Beaten& beaten) {
+    return beaten.why_standard.empty() ? "No reason is known to keep it."
+                                       : "It stays: " + beaten.why_standard + ".";
+}
+
+std::string beaten_text(const Suite& suite, const std::vector<Beaten>& beaten) {
+    std::string text;
+    for (const Beaten& b : beaten)
+        text += html().filled("beaten", {{"settings", escaped_html(settings_text(b.by.settings))},
+                                         {"error", number(b.by.error)},
+                                         {"unit", escaped_html(suite.error_unit)},
+                                         {"seconds", number(b.by.seconds)},
+                                         {"why", escaped_html(why_standard(b))}});
+    return text.empty() ? html().filled("unbeaten", {}) : text;
 }
 
 // Every option of every stage; an option that no suite above sweeps trades no accuracy for time.
@@ -182,7 +176,7 @@ Status write_tradeoff_page(const PageInput& input, const std::string& folder) {
                       {"body", escaped_html(suite.body)},
                       {"truth", escaped_html(suite.truth)},
                       {"stem", escaped_html(stem)},
-                      {"cheaper", cheaper_text(suite, cheaper_than_standard(trials, input.noise))},
+                      {"beaten", beaten_text(suite, beaten_standard(suite, trials, input.noise))},
                       {"knobs", knob_rows(suite, trials, input.noise)},
                       {"error", escaped_html(suite.error_name + ", " + suite.error_unit)},
                       {"trials", trial_rows(trials)}});
@@ -210,40 +204,72 @@ Status write_overview_picture(const PageInput& input, const std::string& path) {
     return write_chart_png(sheet, path);
 }
 
-std::string format_accuracy_markdown(const PageInput& input) {
+namespace {
+
+std::string markdown_heading(const Suite& suite) {
+    return "\n## " + suite.title + " (" + suite.body + ")\n";
+}
+
+std::string markdown_section(const PageInput& input, const Suite& suite) {
+    const std::vector<Trial> trials = trials_of(input, suite);
+    std::string text =
+        markdown_heading(suite) + "\n" + suite.truth + " Measured on " + input.machine +
+        ".\n\n| knob | standard | meaning | error it trades | value: " + suite.error_unit +
+        ", s |\n|---|---|---|---|---|\n";
+    for (const Knob& knob : suite.knobs) {
+        text += "| `" + knob.key + "` | " + knob.standard +
+                (knob.unit.empty() ? "" : " " + knob.unit) + " | " + knob.meaning + " | " +
+                knob.trades + " | ";
+        for (const Trial& t : trials_of_knob(trials, knob)) {
+            text += (t.settings.empty() ? std::string() : t.settings.front().value) + ": " +
+                    number(t.error) + ", " + number(t.seconds) + "; ";
+        }
+        text += "|\n";
+    }
+    text +=
+        "\n| setting | " + suite.error_name + ", " + suite.error_unit + " | s |\n|---|---|---|\n";
+    for (const Trial& t : trials) {
+        if (t.role == TrialRole::knob || t.role == TrialRole::pair) continue;
+        text += "| " + t.name + " | " + number(t.error) + " | " + number(t.seconds) + " |\n";
+    }
+    for (const Beaten& b : beaten_standard(suite, trials, input.noise))
+        text += "\nThe standard is beaten by `" + settings_text(b.by.settings) + "`, " +
+                number(b.by.error) + " " + suite.error_unit + " in " + number(b.by.seconds) +
+                " s. " + why_standard(b) + "\n";
+    return text;
+}
+
+}  // namespace
+
+std::string format_accuracy_markdown(const PageInput& input, const std::string& before) {
     std::string text =
         "# What accuracy costs\n\n"
         "Written by `scripts/accuracy` from the table of knobs and a sweep (`sonocase tradeoff`); "
         "do not edit.\n"
-        "Measured on " +
-        input.machine +
-        ".\n\n"
+        "Seconds are those of processors, all threads together, unless a part says otherwise; each "
+        "part names its machine.\n\n"
         "![error against seconds](pictures/accuracy.png)\n\n"
         "Lower and further left is better; both axes are logarithmic. Red: the paper's own "
         "method. Blue: the front, of which no setting tried is beaten in both.\n";
-    for (const Suite& suite : input.suites) {
-        const std::vector<Trial> trials = trials_of(input, suite);
-        text += "\n## " + suite.title + " (" + suite.body + ")\n\n" + suite.truth + "\n\n";
-        text += "| knob | standard | meaning | error it trades | value: " + suite.error_unit +
-                ", s |\n|---|---|---|---|---|\n";
-        for (const Knob& knob : suite.knobs) {
-            text += "| `" + knob.key + "` | " + knob.standard +
-                    (knob.unit.empty() ? "" : " " + knob.unit) + " | " + knob.meaning + " | " +
-                    knob.trades + " | ";
-            for (const Trial& t : trials_of_knob(trials, knob)) {
-                text += (t.settings.empty() ? std::string() : t.settings.front().value) + ": " +
-                        number(t.error) + ", " + number(t.seconds) + "; ";
-            }
-            text += "|\n";
+    // Parts that this sweep has, in the places of those before; the others as they were.
+    const std::string options = options_table();
+    std::vector<bool> written(input.suites.size(), false);
+    std::size_t at = before.find("\n## ");
+    while (at != std::string::npos && before.compare(at, 9, options, 0, 9) != 0) {
+        const std::size_t next = before.find("\n## ", at + 1);
+        const std::string part = before.substr(at, next == std::string::npos ? next : next - at);
+        std::string now = part;
+        for (std::size_t i = 0; i < input.suites.size(); ++i) {
+            if (!part.starts_with(markdown_heading(input.suites[i]))) continue;
+            now = markdown_section(input, input.suites[i]);
+            written[i] = true;
         }
-        text += "\n| setting | " + suite.error_name + ", " + suite.error_unit +
-                " | s |\n|---|---|---|\n";
-        for (const Trial& t : trials) {
-            if (t.role == TrialRole::knob || t.role == TrialRole::pair) continue;
-            text += "| " + t.name + " | " + number(t.error) + " | " + number(t.seconds) + " |\n";
-        }
+        text += now;
+        at = next;
     }
-    return text + options_table();
+    for (std::size_t i = 0; i < input.suites.size(); ++i)
+        if (!written[i]) text += markdown_section(input, input.suites[i]);
+    return text + options;
 }
 
 }  // namespace sonocase::pipeline::inline tradeoff

@@ -162,7 +162,9 @@ int tradeoff(const TradeoffOptions& options) {
         if (const Status s = write_overview_picture(page, options.picture); !s)
             return fail("tradeoff", s.error());
     if (!options.markdown.empty()) {
-        const Status s = write_file(options.markdown, format_accuracy_markdown(page));
+        const auto before = read_text_file(options.markdown);
+        const Status s =
+            write_file(options.markdown, format_accuracy_markdown(page, before ? *before : ""));
         if (!s) return fail("tradeoff", s.error());
     }
     if (!options.front.empty()) {
@@ -209,7 +211,8 @@ int verb_tradeoff(int argc, char** argv) {
     app.add_option("--data", options.data, "Folder that the recipe's input paths start from")
         ->type_name("DIR");
     app.add_option("--markdown", options.markdown,
-                   "Also write the tables as Markdown (docs/accuracy.md)")
+                   "Also write the tables as Markdown (docs/accuracy.md), in place of those of the "
+                   "same suites")
         ->type_name("FILE");
     app.add_option("--picture", options.picture,
                    "Also draw what is at the head of docs/accuracy.md: error against seconds of "

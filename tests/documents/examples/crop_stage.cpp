@@ -48,7 +48,7 @@ StageDescriptor crop_stage() {
     stage.codec = label_codec(kCtLabels);
     stage.reports = reports_of(kCtLabels);
     stage.share = 0.01;
-    stage.cost = {.threads = 1, .base_mb = 240, .per_label_voxel = 4};
+    stage.cost = {.threads = 1, .per_label_voxel = 4};
     stage.verb = verb();
     return stage;
 }

@@ -11,10 +11,13 @@
 #include "formats/calibration/least_squares.h"
 #include "formats/calibration/pose_screen.h"
 #include "support/calibration_motion.h"
+#include "support/hard_case.h"
 #include "support/read_recording.h"
 
 namespace sonocase {
 namespace {
+
+using testing::HardCase;
 
 using testing::pivot_recording;
 using testing::PivotMotion;
@@ -46,6 +49,7 @@ TEST(PointCalibration, OpticalPivotRecordingGivesThePublishedAnswer) {
 TEST(PointCalibration, ThirtyPercentOfArbitraryMotionMovesTheTipLessThanHalfAMillimetre) {
     const std::vector<Pose> clean = read_recording("pivot_optical_yaniv/poses.csv");
     if (clean.empty()) GTEST_SKIP() << "shared/data/tracking is absent";
+    HardCase tip("tip, 30 % of the poses arbitrary", HardCase::at_most, 0.15, "mm");
     for (std::uint64_t seed = 1; seed <= 20; ++seed) {
         Random random(seed);
         std::vector<Pose> poses = clean;
@@ -56,7 +60,7 @@ TEST(PointCalibration, ThirtyPercentOfArbitraryMotionMovesTheTipLessThanHalfAMil
             }
         }
         const PointFit fit = fit_point(poses);
-        EXPECT_LT(norm(fit.tip_mm - kYanivTip), 0.15) << "seed " << seed;
+        tip.see(norm(fit.tip_mm - kYanivTip));
         EXPECT_NEAR(fit.inliers, 0.7 * 481, 45) << "seed " << seed;
     }
 }
@@ -64,6 +68,7 @@ TEST(PointCalibration, ThirtyPercentOfArbitraryMotionMovesTheTipLessThanHalfAMil
 TEST(PointCalibration, ABlockOfOtherHandlingIsLeftOut) {
     const std::vector<Pose> clean = read_recording("pivot_optical_yaniv/poses.csv");
     if (clean.empty()) GTEST_SKIP() << "shared/data/tracking is absent";
+    HardCase tip("tip, 30 % in one block", HardCase::at_most, 0.3, "mm");
     // The tool lies still on the table; wanders; pivots on another point.
     for (int kind = 0; kind < 3; ++kind) {
         Random random(5);
@@ -83,7 +88,7 @@ TEST(PointCalibration, ABlockOfOtherHandlingIsLeftOut) {
             poses[i].tracker_from_tool = walk;
         }
         const PointFit fit = fit_point(poses);
-        EXPECT_LT(norm(fit.tip_mm - kYanivTip), 0.3) << "kind " << kind;
+        tip.see(norm(fit.tip_mm - kYanivTip));
         EXPECT_LT(distance(fit.pivot_mm, {146.901, -62.9689, -1042.14}), 0.3) << "kind " << kind;
     }
 }
@@ -238,6 +243,7 @@ TEST(PointCalibration, RigidMotionOfTheTrackerMovesOnlyThePivot) {
 }
 
 TEST(PointCalibration, FarOriginCostsNoMoreThanItsRounding) {
+    HardCase tip("tip, origin 1.7e5 mm away", HardCase::at_most, 1e-9, "mm");
     Random random(6);
     PivotMotion motion;
     std::vector<Pose> poses = pivot_recording(motion, random);
@@ -246,11 +252,12 @@ TEST(PointCalibration, FarOriginCostsNoMoreThanItsRounding) {
     }
     const PointFit fit = fit_point(poses);
     // A position of 1e5 mm is stored to 1.5e-11 mm; the condition is about 10.
-    EXPECT_LT(norm(fit.tip_mm - motion.tip_mm), 1e-9);
+    tip.see(norm(fit.tip_mm - motion.tip_mm));
     EXPECT_TRUE(fit.determined);
 }
 
 TEST(PointCalibration, LittleTiltIsToldByTheSigma) {
+    HardCase share("share of errors within a sigma, off 0.683", HardCase::at_most, 0.07, "");
     double before = 0;
     for (double tilt : {60.0, 20.0, 5.0}) {
         Random random(7);
@@ -268,7 +275,7 @@ TEST(PointCalibration, LittleTiltIsToldByTheSigma) {
                 inside += std::abs(fit.tip_mm[c] - motion.tip_mm[c]) <= fit.sigma_mm[c];
             }
         }
-        EXPECT_NEAR(inside / 600.0, 0.683, 0.07) << tilt;
+        share.see(std::abs(inside / 600.0 - 0.683));
         EXPECT_GT(sigma, 1.8 * before) << tilt;  // about as one over the tilt
         before = sigma;
     }
@@ -276,6 +283,7 @@ TEST(PointCalibration, LittleTiltIsToldByTheSigma) {
 }
 
 TEST(PointCalibration, SlowDriftWidensTheSigma) {
+    HardCase share("share of errors within a sigma, drifting", HardCase::at_least, 0.5, "");
     // Errors that drift slowly count for less than their number: without the allowance the stated
     // sigma would cover almost nothing.
     Random random(15);
@@ -302,7 +310,7 @@ TEST(PointCalibration, SlowDriftWidensTheSigma) {
             inside += std::abs(fit.tip_mm[c] - motion.tip_mm[c]) <= fit.sigma_mm[c];
         }
     }
-    EXPECT_GT(inside / 300.0, 0.5);
+    share.see(inside / 300.0);
 }
 
 // 57 poses with 2 mm noise, three of them 25 mm away from where they should be.

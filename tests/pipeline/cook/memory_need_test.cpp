@@ -34,9 +34,9 @@ TEST(MemoryNeed, IsWithinFifteenPercentOfWhatABuildTook) {
     const struct {
         const char *voxels, *stage;
         double peak_mb;
-    } measured[] = {{"voxel_mm = 3\nslice_mm = 3\n", "structure", 439},
-                    {"voxel_mm = 1.5\nslice_mm = 1.5\n", "resample", 816},
-                    {"voxel_mm = 1\nslice_mm = 1\n", "resample", 990}};
+    } measured[] = {{"voxel_mm = 3\nslice_mm = 3\n", "structure", 420},
+                    {"voxel_mm = 1.5\nslice_mm = 1.5\n", "resample", 759},
+                    {"voxel_mm = 1\nslice_mm = 1\n", "resample", 1112}};
     for (const auto& m : measured) {
         const MemoryNeed need = need_of(head + m.voxels);
         EXPECT_EQ(need.stage, m.stage);
@@ -46,20 +46,24 @@ TEST(MemoryNeed, IsWithinFifteenPercentOfWhatABuildTook) {
 
 // The same for bodies that the law was not fitted to: the presets of the scenarios of these names.
 TEST(MemoryNeed, OfPhantomNeckAndFreeFluidIsWithinFifteenPercentAsWell) {
+    const auto fluid = [](const std::string& name) {
+        return "[[pathology]]\nname = \"" + name +
+               "\"\nkind = \"ascites\"\nhost = \"visceral_fat\"\nvolume_ml = 25\n";
+    };
     const std::string known = "name = \"a\"\n[analytic]\nknown_map = true\n";
     const struct {
         std::string recipe;
         const char* stage;
         double peak_mb;
     } measured[] = {
-        {known + "body = \"flow-phantom\"\nvoxel_mm = 1\nslice_mm = 1\n", "resample", 466},
+        {known + "body = \"flow-phantom\"\nvoxel_mm = 1\nslice_mm = 1\n", "resample", 493},
         {known + "body = \"neck\"\nneck_seed = 7\nvoxel_mm = 0.75\nslice_mm = 1\n"
                  "strength = 0\nmesh = true\npoints = 3000\n"
                  "[resample]\nvoxel_mm = 0.75\n",
-         "resample", 620},
-        {known + "voxel_mm = 2\nslice_mm = 3\n[[pathology]]\nname = \"fluid\"\n"
-                 "kind = \"ascites\"\nhost = \"visceral_fat\"\nvolume_ml = 25\n",
-         "pathology", 1114}};
+         "resample", 572},
+        {known + "voxel_mm = 2\nslice_mm = 3\n" + fluid("a"), "resample", 636},
+        {known + "voxel_mm = 2\nslice_mm = 3\n" + fluid("a") + fluid("b") + fluid("c"), "pathology",
+         932}};
     for (const auto& m : measured) {
         const MemoryNeed need = need_of(m.recipe);
         EXPECT_EQ(need.stage, m.stage) << m.recipe;
@@ -82,7 +86,7 @@ TEST(MemoryNeed, OfOrganMeshesIsThatOfTheVoxelsThatTheyBecome) {
 TEST(MemoryNeed, OfThickSlicesIsThatOfTheNodesBetweenThem) {
     const std::string head = "name = \"a\"\n[analytic]\nvoxel_mm = 2\n";
     const MemoryNeed thick = need_of(head + "slice_mm = 3\n[resample]\nvoxel_mm = 3\n");
-    EXPECT_NEAR(thick.mb / 672, 1, 0.15);  // demo-torso's map, two threads
+    EXPECT_NEAR(thick.mb / 650, 1, 0.15);  // demo-torso's map, two threads
     const MemoryNeed even = need_of(head + "slice_mm = 2\n[resample]\nvoxel_mm = 3\n");
     EXPECT_EQ(even.size.interpolated_nodes, 0);
     EXPECT_GT(thick.size.interpolated_nodes, thick.size.label_voxels);
@@ -108,6 +112,31 @@ TEST(MemoryNeed, GrowsWithTheCookedVoxels) {
     const MemoryNeed coarse = need_of(head + "2"), fine = need_of(head + "0.5");
     EXPECT_NEAR(fine.size.cooked_voxels / coarse.size.cooked_voxels, 64, 1e-6);
     EXPECT_GT(fine.mb, coarse.mb);
+}
+
+// A CT's organs have many surfaces for their voxels, a phantom few: distances are held near them.
+TEST(MemoryNeed, GoesByTheSurfacesOfTheMap) {
+    const std::string head =
+                          "name = \"a\"\n[analytic]\nknown_map = true\nvoxel_mm = 1.5\n"
+                          "slice_mm = 1.5\n",
+                      coarse = "[resample]\nvoxel_mm = 4\n";
+    const MemoryNeed torso = need_of(head + coarse),
+                     tubes = need_of(head + "body = \"flow-phantom\"\n" + coarse);
+    // 0.878 million faces between the torso's own voxels, counted.
+    EXPECT_NEAR(torso.size.surfaces / 0.878, 1, 0.05);
+    EXPECT_NEAR(torso.size.surface_share(), 1, 0.05);
+    EXPECT_LT(tubes.size.surface_share(), 0.5);
+    EXPECT_LT(tubes.mb, 0.6 * torso.mb);
+}
+
+// Large textures are matched by transforms of the whole cube: 128 voxels took 468 MB in real-torso
+// at 1.7 mm, where 64 take 320.
+TEST(MemoryNeed, GoesByTheEdgeOfTheTextures) {
+    CaseSize size;
+    size.cooked_voxels = 15.5;
+    size.texture_edge = 128;
+    const StageDescriptor& texture = *built_in_stages().find("texture");
+    EXPECT_NEAR(texture.cost.memory_mb(size) / 468.0, 1, 0.15);
 }
 
 // Round a label: the box that the analytic liver has in the map, and twice the margin. The cooked

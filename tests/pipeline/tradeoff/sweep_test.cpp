@@ -83,6 +83,41 @@ TEST(Sweep, SettingsThatComeToTheSameAreMeasuredOnce) {
     }
 }
 
+// A standard is beaten by what is no worse in both and better in one by more than noise.
+TEST(Sweep, ABeatenStandardIsFoundWithTheReasonWhyItStays) {
+    Suite s;
+    s.knobs = {{"a", {"1", "2", "3", "4"}, "2", "", "", "", "", "it is kept for the body"},
+               {"b", {"1", "2"}, "1", "", "", "", ""}};
+    s.named = {{TrialRole::peer, "other", {{"c", "1"}}, "it is another question"}};
+    const auto trial = [](TrialRole role, const char* name, Settings settings, double error,
+                          double seconds) {
+        Trial t;
+        t.role = role;
+        t.name = name;
+        t.settings = std::move(settings);
+        t.error = error;
+        t.seconds = seconds;
+        return t;
+    };
+    const std::vector<Trial> trials = {
+        trial(TrialRole::standard, "standard", {}, 1, 10),
+        trial(TrialRole::knob, "a", {{"a", "1"}}, 1.01, 8),    // as good, a fifth cheaper
+        trial(TrialRole::knob, "a", {{"a", "3"}}, 0.9, 9),     // better in both, by noise
+        trial(TrialRole::knob, "a", {{"a", "4"}}, 0.5, 10.5),  // better, but dearer
+        trial(TrialRole::knob, "b", {{"b", "2"}}, 0.8, 10),
+        trial(TrialRole::peer, "other", {{"c", "1"}}, 0.7, 5),
+        trial(TrialRole::knob, "a", {{"a", "2"}}, NAN, NAN),  // failed
+    };
+    const auto beaten = beaten_standard(s, trials, 0.15);
+    ASSERT_EQ(beaten.size(), 3u);
+    EXPECT_EQ(settings_text(beaten[0].by.settings), "a=1");
+    EXPECT_EQ(beaten[0].why_standard, "it is kept for the body");
+    EXPECT_EQ(settings_text(beaten[1].by.settings), "b=2");
+    EXPECT_EQ(beaten[1].why_standard, "");
+    EXPECT_EQ(beaten[2].why_standard, "it is another question");
+    EXPECT_TRUE(beaten_standard(s, {trials.begin() + 1, trials.end()}, 0.15).empty());
+}
+
 TEST(Sweep, FailedSettingIsKeptWithItsMessage) {
     int runs = 0;
     const Suite s = suite(runs);
