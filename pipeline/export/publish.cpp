@@ -59,8 +59,12 @@ Result<ReadCase> site_case(std::span<const std::uint8_t> given, const std::strin
             hash_of(bytes.subspan(at, std::min(kSegmentBytes, bytes.size() - at))));
     out.preview = std::move(bundle.preview_png);
     for (const Exercise& exercise : exercises) {
-        out.exercises.push_back({exercise.name, exercise.title, exercise.description,
-                                 exercise.mastery, texts_of_exercise(bundle, exercise.name), {}});
+        out.exercises.push_back({exercise.name,
+                                 exercise.title,
+                                 exercise.description,
+                                 exercise.mastery,
+                                 texts_of_exercise(bundle, exercise.name),
+                                 {}});
         for (const Sweep& sweep : exercise.sweeps)
             out.exercises.back().sweeps.push_back(sweep.name);
     }

@@ -36,7 +36,7 @@ struct SiteCase {
         std::string name, title, description;
         int mastery = 3;                   // passes in a row
         std::vector<ExerciseTexts> texts;  // in other languages
-        std::vector<std::string> sweeps;  // names; not on the site's list
+        std::vector<std::string> sweeps;   // names; not on the site's list
     };
     std::vector<Entry> exercises;
 };
