@@ -107,6 +107,18 @@ std::string case_json(const PagePlayer& player) {
     return detail::json_text(out, false);
 }
 
+std::string metric_words_json() {
+    Json out = Json::array();
+    for (const MetricInfo& info : metric_table()) {
+        Json item = Json::object();
+        item["name"] = info.name;
+        item["title"] = info.title;
+        item["unit"] = metric_unit(info.name);
+        out.push_back(std::move(item));
+    }
+    return detail::json_text(out, false);
+}
+
 std::string result_json(const SessionScore& score) {
     const AttemptResult result = attempt_result(score);
     Json out = Json::object();

@@ -20,6 +20,9 @@ namespace sonocase::runtime::inline web {
 // "number"}], "warnings": [texts]}; a limit that does not exist is null.
 std::string case_json(const PagePlayer& player);
 
+// [{"name", "title", "unit"}] of every score, in the order of metric_table().
+std::string metric_words_json();
+
 // The page after an attempt (attempt_result.h): {"has_marks", "passed", "marks", "marks_reached",
 // "advice", "rows": [{"title", "value", "measured", "has_limit", "at_least", "none", "limit",
 // "reached"}], "measures": [{"title", "value", "evidence"}] of all that were measured}. Values and

@@ -176,7 +176,7 @@ class App {
             row = passed ? row + 1 : 0;
             passes += passed;
             mastered ||= row >= (mastery ?? 3);
-            best = Math.min(best, JSON.parse(score_text).metrics.final_tip_to_target_mm ?? Infinity);
+            best = Math.min(best, JSON.parse(score_text).metrics?.final_tip_to_target_mm ?? Infinity);
         }
         const said = mastered ? t('Mastered') : passes ? t('Passed %d of %d', passes, attempts.length) : t('Not passed in %d', attempts.length);
         return {good: passes > 0, said: best < Infinity ? `${said} · ${t('best')} ${best.toFixed(1)} mm` : said};

@@ -243,6 +243,10 @@ export class Core {
         const score_text = this.text();
         return {recording, score_text, score: JSON.parse(score_text)};
     }
+    metric_words() {
+        this.calls.metric_words();
+        return JSON.parse(this.text());
+    }
     // The attempt that finished last, for the page after it (page_json.h).
     result() {
         this.calls.result();

@@ -7,6 +7,7 @@ import {KeptCourse, hold_alone, platform_of} from './lms.js';
 import {statement, trainee} from './results.js';
 import {element} from './scan.js';
 import {fetch_twice} from './source.js';
+import {t} from './words.js';
 
 const $ = (id) => document.getElementById(id);
 
@@ -220,6 +221,7 @@ export class CourseView {
         return item;
     }
     entry_of(module) { return this.list.cases.find((one) => one.title === module.case); }
+    measure_title(name) { return t(this.metrics.get(name)?.title ?? name); }
     value_words(module, value) {
         if (value === null || !Number.isFinite(value)) return '–';
         if (module.measure.endsWith('_fraction')) return `${Math.round(100 * value)} %`;
@@ -253,7 +255,7 @@ export class CourseView {
         if (module.measure) {
             const limits = [module.at_least === null ? '' : course_words('at_least', this.value_words(module, module.at_least)),
                 module.at_most === null ? '' : course_words('at_most', this.value_words(module, module.at_most))].filter((one) => one).join(', ');
-            parts.push(fact(course_words('practise_this', this.metrics.get(module.measure)?.title ?? module.measure),
+            parts.push(fact(course_words('practise_this', this.measure_title(module.measure)),
                 `${limits} · ${course_words('last', this.value_words(module, now.measured))}`, now.in_limits ? 'pass' : ''));
         }
         parts.push(fact(this.gate_words(module), this.stands_words(module, now), now.passed ? 'pass' : ''));

@@ -277,6 +277,10 @@ SONOCASE_EXPORT(guide) int guide(int frozen) {
     return 1;
 }
 
+SONOCASE_EXPORT(metric_words) void metric_words() {
+    page.text = metric_words_json();
+}
+
 SONOCASE_EXPORT(choose_exercise) int choose_exercise(int index, int side_px) {
     return answer(page.player->choose_exercise(index, side_px));
 }
