@@ -25,13 +25,12 @@ bool in_ellipsoid(const FreeFluid& fluid, const Matrix3& axes, Vector3 from_cent
 FreeFluidPlace::FreeFluidPlace(const FreeFluid& fluid,
                                const std::function<int(Point3)>& label_at,
                                const std::vector<Label>& labels)
-    : fluid_(fluid) {
+    : fluid_(fluid), axes_(free_fluid_axes(fluid)) {
     if (!(fluid.ml > 0)) return;
     for (std::size_t l = 1; l < labels.size(); ++l)
         if (labels[l].name == fluid.lies_in) label_ = static_cast<int>(l);
     if (label_ < 0) return;
     const Vector3 h = fluid.half_mm;
-    const Matrix3 axes = free_fluid_axes(fluid);
     const double cell_mm = std::cbrt(8 * h.x * h.y * h.z / kPointsOfBox);
     point_ml_ = cell_mm * cell_mm * cell_mm / 1000;
     // Anywhere in its cell, so that points in one plane do not all get wet at the same level.
@@ -43,17 +42,16 @@ FreeFluidPlace::FreeFluidPlace(const FreeFluid& fluid,
             for (int x = -nx; x < nx; ++x) {
                 const double dx = draws.unit(), dy = draws.unit(), dz = draws.unit();
                 const Vector3 p =
-                    axes * Vector3{cell_mm * (x + dx), cell_mm * (y + dy), cell_mm * (z + dz)};
-                if (in_ellipsoid(fluid, axes, p) && label_at(fluid.centre + p) == label_)
+                    axes_ * Vector3{cell_mm * (x + dx), cell_mm * (y + dy), cell_mm * (z + dz)};
+                if (in_ellipsoid(fluid, axes_, p) && label_at(fluid.centre + p) == label_)
                     points_.push_back(p);
             }
     heights_.resize(points_.size());
 }
 
 Vector3 FreeFluidPlace::up(double turn_deg, double head_down_deg) const {
-    const Matrix3 axes = free_fluid_axes(fluid_);
     const double turn = turn_deg * kRadPerDeg, tilt = head_down_deg * kRadPerDeg;
-    const Vector3 right = axes.column(0), front = axes.column(1), head = axes.column(2);
+    const Vector3 right = axes_.column(0), front = axes_.column(1), head = axes_.column(2);
     const Vector3 turned = cosine(turn) * front + sine(turn) * right;
     return cosine(tilt) * turned - sine(tilt) * head;
 }
@@ -73,7 +71,7 @@ double FreeFluidPlace::level_mm(double ml, Vector3 up) {
 bool FreeFluidPlace::contains(Point3 rest, int label, Vector3 up, double level_mm) const {
     if (label_ < 0 || label != label_) return false;
     const Vector3 p = rest - fluid_.centre;
-    return dot(p, up) < level_mm && in_ellipsoid(fluid_, free_fluid_axes(fluid_), p);
+    return dot(p, up) < level_mm && in_ellipsoid(fluid_, axes_, p);
 }
 
 }  // namespace sonocase

@@ -33,6 +33,7 @@ class FreeFluidPlace {
 
   private:
     FreeFluid fluid_;
+    Matrix3 axes_;  // free_fluid_axes()
     int label_ = -1;
     double point_ml_ = 0;
     std::vector<Vector3> points_;  // from the centre, in that tissue
