@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "formats/base/constants.h"
 #include "formats/base/portable_math.h"
 #include "formats/exercise/motion.h"
+#include "formats/exercise/pool_shift.h"
 #include "formats/scoring/session_monitor.h"
 #include "formats/text/number_text.h"
 #include "formats/volume/tissue.h"
@@ -230,7 +232,7 @@ void ProcedureRun::look(const Facts& f) {
             if (blocked) continue;
             const double depth = (row + 0.5) * probe_.depth_mm / rows;
             const Point3 p = f.probe * (face + depth * along);
-            const Point3 rest = anatomy_->at_rest(p, f.time_s);
+            const Point3 rest = tissue_at(p, f.time_s);
             const int label = anatomy_->label(rest);
             if (label == 0) {
                 blocked = ++air > rows / 20;  // gel bridges a gap; beyond it is air
@@ -361,6 +363,22 @@ int ProcedureRun::collection(const Facts& f) const {
     return full_ml_[static_cast<std::size_t>(f.region)] > 0 ? f.region : -1;
 }
 
+void ProcedureRun::show_pools(SceneChange& out) const {
+    out.pool_count = 0;
+    for (int i = 0; i < state_.pool_count; ++i) {
+        const ProcedureState::Pool& pool = state_.pools[static_cast<std::size_t>(i)];
+        if (pool.ml > 0)
+            out.pools[static_cast<std::size_t>(out.pool_count++)] = {
+                pool.centre, ball_radius_mm(pool.ml), pool.blood};
+    }
+}
+
+Point3 ProcedureRun::tissue_at(Point3 p, double time_s) const {
+    return before_pools(
+        std::span(pushed_.pools).first(static_cast<std::size_t>(pushed_.pool_count)),
+        anatomy_->at_rest(p, time_s));
+}
+
 void ProcedureRun::inject(double ml, const Facts& f) {
     if (!(ml > 0)) return;
     const Kind kind = kind_[static_cast<std::size_t>(f.label)];
@@ -454,7 +472,7 @@ void ProcedureRun::core_throw(double mm, const Facts& f) {
     };
     for (int i = 0; i < count; ++i) {
         const Point3 now = f.tip + (i + 0.5) * kThrowStepMm * f.direction;
-        const Point3 rest = anatomy_->at_rest(now, f.time_s);
+        const Point3 rest = tissue_at(now, f.time_s);
         const int label = anatomy_->label(rest);
         int tissue = label;
         for (std::size_t r = 0; r < regions_.size(); ++r) {
@@ -720,6 +738,7 @@ void ProcedureRun::update(double time_s,
     f.vein_open = as_recorded(press.vein_open);
     f.acts = &acts;
     looked_now_ = false;
+    show_pools(pushed_);
     if (f.needle_ok) {
         f.tip = Point3{} + f.needle.translation;
         f.direction = f.needle.rotation.column(2);
@@ -728,7 +747,7 @@ void ProcedureRun::update(double time_s,
             f.depth_mm = std::max(insertion_depth_mm(*anatomy_, f.tip, f.direction,
                                                      exercise_->needle.length_mm, &f.skin),
                                   0.0);
-            f.tip_rest = anatomy_->at_rest(f.tip, time_s);
+            f.tip_rest = tissue_at(f.tip, time_s);
             f.label = f.depth_mm > 0 ? anatomy_->label(f.tip_rest) : 0;
         }
         double nearest = INFINITY;
@@ -882,12 +901,7 @@ double ProcedureRun::volume_ml(int target) const {
 SceneChange ProcedureRun::scene() const {
     SceneChange out;
     if (!given()) return out;
-    for (int i = 0; i < state_.pool_count; ++i) {
-        const ProcedureState::Pool& pool = state_.pools[static_cast<std::size_t>(i)];
-        if (pool.ml > 0)
-            out.pools[static_cast<std::size_t>(out.pool_count++)] = {
-                pool.centre, ball_radius_mm(pool.ml), pool.blood};
-    }
+    show_pools(out);
     const std::size_t shown = exercise_->targets.size();
     for (std::size_t t = 0; t < out.target_scale.size() && t < shown; ++t)
         if (full_ml_[t] > 0 && left_ml_[t] != full_ml_[t])

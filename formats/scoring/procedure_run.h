@@ -236,6 +236,9 @@ class ProcedureRun {
     void act(const Act& act, const Facts& facts);
     void count_stray_acts(const Facts& facts);
     void inject(double ml, const Facts& facts);
+    void show_pools(SceneChange& out) const;
+    // Where the tissue that is now at p lies at rest: less breathing, and less what pools push.
+    Point3 tissue_at(Point3 p, double time_s) const;
     void aspirate(double ml, const Facts& facts);
     void core_throw(double mm, const Facts& facts);
     void bleed(Point3 rest, double time_s);
@@ -275,6 +278,7 @@ class ProcedureRun {
     int looked_ = 0;
     bool looked_now_ = false;
     SceneChange::Line wire_, catheter_;
+    SceneChange pushed_;  // its pools alone: as the present sample found them
     int catheter_region_ = -1;
     // Of the collection or vein that the tip was in last.
     int last_region_ = -1, last_vein_ = 0;

@@ -231,6 +231,8 @@ FrameStatus Renderer::render(const FrameInput& input, std::span<std::uint8_t> pi
         const NeedlePose& in = input.needle;
         m.probe->dent(shown ? bounded_dent(needle.tip, needle.axis, in.tent_mm, in.drag_mm)
                             : NeedleDent{});
+        ImageFormation::Pools pools;
+        m.probe->set_pools({pools.data(), m.formation->pools_of(held, pools)});
         pressed = m.probe->moving();
     }
     const FrameRequest request{held, shown ? &needle : nullptr, pressed, level.row_gain_db};

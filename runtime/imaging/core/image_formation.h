@@ -7,6 +7,7 @@
 // list at the top of runtime/imaging/renderer.cpp.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -70,6 +71,10 @@ class ImageFormation {
                                     const FrameRequest& request,
                                     std::span<std::uint8_t> pixels,
                                     std::span<EffectCost> costs) = 0;
+    // Pools of fluid that the model draws, which push tissue aside where effect deformation is on:
+    // where they are in this frame, `mannequin`. Returns their number.
+    using Pools = std::array<SceneChange::Pool, SceneChange::kMaxPools>;
+    virtual std::size_t pools_of(const FrameInput&, Pools&) const { return 0; }
     // Row of the effect that frames leave out from now on, although it is on; -1: none.
     virtual void leave_out(int effect) = 0;
     // Renders the same picture by the slow, obvious renderer at level 0; never flipped.

@@ -98,6 +98,20 @@ class PhysicalFormation final : public ImageFormation {
                                                     : FrameStatus::rendered;
     }
 
+    std::size_t pools_of(const FrameInput& input, Pools& out) const override {
+        if (scene_.wire < 0 || !shown_.deformation) return 0;
+        const MotionState motion = motion_of(input);
+        const int count = std::clamp(input.change.pool_count, 0, SceneChange::kMaxPools);
+        for (int i = 0; i < count; ++i) {
+            SceneChange::Pool& pool = out[static_cast<std::size_t>(i)];
+            pool = input.change.pools[static_cast<std::size_t>(i)];
+            const Point3 rest = pool.centre;
+            for (int step = 0; step < 4 && shown_.breathing && motion.breathes(); ++step)
+                pool.centre = rest + breathing_.weight(pool.centre) * motion.breathing_mm;
+        }
+        return static_cast<std::size_t>(count);
+    }
+
     void leave_out(int effect) override {
         switches_ = switches_without(kPhysicalEffects, chosen_, effect);
         shown_ = shown_by(switches_, machine_.structures);
@@ -125,6 +139,11 @@ class PhysicalFormation final : public ImageFormation {
         std::unique_ptr<PhysicalFast> fast;  // null for the reference
     };
 
+    MotionState motion_of(const FrameInput& input) const {
+        return motion_at(exercise_.breathing, exercise_.pulsation,
+                         std::isfinite(input.time_s) ? input.time_s : 0);
+    }
+
     PhysicalFrame frame_of(const FrameRequest& request) const {
         const FrameInput& input = request.input;
         PhysicalFrame frame;
@@ -136,15 +155,15 @@ class PhysicalFormation final : public ImageFormation {
         frame.dynamic_range_db = std::isfinite(input.settings.dynamic_range_db)
                                      ? std::clamp(input.settings.dynamic_range_db, 20.0, 120.0)
                                      : 60.0;
-        frame.motion = motion_at(exercise_.breathing, exercise_.pulsation,
-                                 std::isfinite(input.time_s) ? input.time_s : 0);
+        frame.motion = motion_of(input);
         frame.motion.vein_mm =
             std::isfinite(input.change.vein_wall_mm) ? input.change.vein_wall_mm : 0;
         frame.effects = shown_;
         frame.press = shown_.deformation ? request.press : nullptr;
         if (scene_.wire >= 0) {  // the exercise has a procedure
+            const bool pushes = frame.press != nullptr && !frame.press->pools().empty();
             balls_of_frame(scene_, input.change, static_cast<int>(exercise_.findings.size()),
-                           balls_);
+                           pushes ? &frame.volume_from_probe.rotation : nullptr, balls_);
             frame.balls = &balls_;
         }
         return frame;

@@ -153,8 +153,16 @@ void PressField::lift() {
     ++version_;
 }
 
+void PressField::set_pools(std::span<const SceneChange::Pool> pools) {
+    assert(pools.size() <= pools_.size());
+    pool_count_ = static_cast<int>(pools.size());
+    std::copy(pools.begin(), pools.end(), pools_.begin());
+}
+
 double PressField::farthest_mm() const {
-    return state_.farthest_mm + std::abs(dent_.tent_mm) + std::abs(dent_.drag_mm);
+    double mm = state_.farthest_mm + std::abs(dent_.tent_mm) + std::abs(dent_.drag_mm);
+    for (const SceneChange::Pool& pool : pools()) mm += (1 - kPoolCore) * pool.radius_mm;
+    return mm;
 }
 
 bool PressField::press(SimdTarget simd, const PressScene& scene, const PressOptions& options) {
@@ -240,7 +248,68 @@ BeamPoint PressField::shown_before_dent(BeamPoint rest) const {
     return {lateral, shown};
 }
 
+void shift_by_pools(std::span<const SceneChange::Pool> pools,
+                    const ScanGeometry::Beam& beam,
+                    double r_mm,
+                    PlaneShift& s) {
+    const PlanePoint d = beam.direction, n = beside(d);
+    PlanePoint p{beam.origin.x + (r_mm + s.along_mm) * d.x + s.side_mm * n.x,
+                 beam.origin.z + (r_mm + s.along_mm) * d.z + s.side_mm * n.z};
+    for (const SceneChange::Pool& pool : pools) {
+        const Vector3 away{p.x - pool.centre.x, -pool.centre.y, p.z - pool.centre.z};
+        const double square = dot(away, away), reach = kPoolReaches * pool.radius_mm;
+        if (square >= reach * reach) continue;
+        const double back = pool_share(std::sqrt(square), pool.radius_mm) - 1;
+        const double x = back * away.x, z = back * away.z;
+        p = {p.x + x, p.z + z};
+        s.along_mm += x * d.x + z * d.z;
+        s.side_mm += x * n.x + z * n.z;
+    }
+}
+
+namespace {
+
+// Where pools have pushed, in the plane, what lay at p.
+PlanePoint after_pools(std::span<const SceneChange::Pool> pools, PlanePoint p) {
+    for (std::size_t i = pools.size(); i-- > 0;) {
+        const SceneChange::Pool& pool = pools[i];
+        const double x = p.x - pool.centre.x, z = p.z - pool.centre.z;
+        const double across2 = pool.centre.y * pool.centre.y;
+        const double reach = kPoolReaches * pool.radius_mm;
+        if (x * x + z * z + across2 >= reach * reach) continue;
+        // The factor of x and z, by the rule of false position (Illinois), to 1e-4.
+        const auto over = [&](double factor) {
+            const double r = std::sqrt(factor * factor * (x * x + z * z) + across2);
+            return factor * pool_share(r, pool.radius_mm) - 1;
+        };
+        double low = 1, high = 1 / kPoolCore, below = over(low), above = over(high), factor = low;
+        for (int step = 0, side = 0; step < 12; ++step) {
+            factor = (low * above - high * below) / std::max(above - below, 1e-12);
+            const double here = over(factor);
+            if (std::abs(here) < 1e-4) break;
+            if (here > 0) {
+                high = factor, above = here;
+                if (side > 0) below *= 0.5;
+                side = 1;
+            } else {
+                low = factor, below = here;
+                if (side < 0) above *= 0.5;
+                side = -1;
+            }
+        }
+        p = {pool.centre.x + factor * x, pool.centre.z + factor * z};
+    }
+    return p;
+}
+
+}  // namespace
+
 BeamPoint PressField::shown_in_plane(BeamPoint rest) const {
+    if (pool_count_ > 0) {
+        const Point3 at = probe_point(face_, rest, 0);
+        const PlanePoint pushed = after_pools(pools(), {at.x, at.z});
+        rest = beam_point(face_, {pushed.x, 0, pushed.z});
+    }
     const BeamPoint before = shown_before_dent(rest);
     if (!dent_.moves()) return before;
     // The needle's shift changes by less than a millimetre per millimetre, so each step comes

@@ -14,7 +14,9 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
 
+#include "formats/exercise/pool_shift.h"
 #include "runtime/imaging/core/needle_shift.h"
 #include "runtime/imaging/core/scan_geometry.h"
 #include "runtime/imaging/press/press_table.h"
@@ -82,7 +84,15 @@ class PressField {
     // push_forward, by which the needle itself finds its layers, leave it out.
     void dent(const NeedleDent& needle) { dent_ = needle; }
     const NeedleDent& needle() const { return dent_; }
-    bool moves() const { return state_.pressed || dent_.moves(); }
+    // Adds pools that push tissue aside (formats/exercise/pool_shift.h), in the frame of the pose
+    // where bone holds the face, as the probe leaves them at rest; all of at least kLeastPoolMm, at
+    // most SceneChange::kMaxPools. Pictures show what they move in the plane; pull_back and
+    // push_forward leave them out.
+    void set_pools(std::span<const SceneChange::Pool> pools);
+    std::span<const SceneChange::Pool> pools() const {
+        return {pools_.data(), static_cast<std::size_t>(pool_count_)};
+    }
+    bool moves() const { return state_.pressed || dent_.moves() || pool_count_ > 0; }
     // No tissue of the plane moves further than this.
     double farthest_mm() const;
     // A number that changes whenever the pressed tissue does.
@@ -102,12 +112,12 @@ class PressField {
     Point3 push_forward(Point3 rest) const;
 
     // The same in the scan plane alone, as renderers need it: relative to the face where bone holds
-    // it, state().excess_mm behind the pose. Undoes first the needle's shift, then the probe's.
-    // Cost: 20 ns.
+    // it, state().excess_mm behind the pose. Undoes first the needle's shift, then the probe's;
+    // plane_shift() undoes that of pools as well. Cost: 20 ns.
     RestPlace rest_in_plane(BeamPoint shown) const;
     // Undoes the probe's shift alone.
     RestPlace pressed_in_plane(BeamPoint shown) const;
-    BeamPoint shown_in_plane(BeamPoint rest) const;  // the inverse
+    BeamPoint shown_in_plane(BeamPoint rest) const;  // the inverse, by pools as well
     // Depth of the pressed skin below the face: 0 where it touches.
     double skin_now_mm(double lateral_mm) const;
     bool closed_in_plane(BeamPoint shown) const;  // nearest node of closed_nodes()
@@ -134,6 +144,8 @@ class PressField {
     std::unique_ptr<Work> work_;
     PressState state_;
     NeedleDent dent_;
+    std::array<SceneChange::Pool, SceneChange::kMaxPools> pools_{};
+    int pool_count_ = 0;
     std::uint32_t version_ = 0;
 };
 
@@ -164,6 +176,12 @@ inline double lateral_of_line(const ScanGeometry& g, double line) {
     return g.fan ? g.radius_mm * across : across;
 }
 
+// Undoes what pools have moved: adds to the shift `s` of a place at depth r_mm of a beam.
+void shift_by_pools(std::span<const SceneChange::Pool> pools,
+                    const ScanGeometry::Beam& beam,
+                    double r_mm,
+                    PlaneShift& s);
+
 // The shift at depth r_mm of a beam, relative to the face where bone holds it. line: number of
 // `beam`, may be a fraction. For a turn of the beam by a small angle e its sine counts as e and its
 // cosine as 1 - e^2 / 2, which is good to 0.002 mm. Cost: 25 ns.
@@ -172,19 +190,23 @@ inline PlaneShift plane_shift(const PressField& field,
                               const ScanGeometry::Beam& beam,
                               double line,
                               double r_mm) {
+    PlaneShift s;
     if (!follows_columns(g)) {
         const PlanePoint p{beam.origin.x + r_mm * beam.direction.x,
                            beam.origin.z + r_mm * beam.direction.z};
         const RestPlace rest = field.rest_in_plane({p.x, p.z});
         const double x = rest.lateral_mm - p.x, z = rest.depth_mm - p.z;
         const PlanePoint n = beside(beam.direction);
-        return {x * beam.direction.x + z * beam.direction.z, x * n.x + z * n.z, 0};
+        s = {x * beam.direction.x + z * beam.direction.z, x * n.x + z * n.z, 0};
+    } else {
+        const double lateral = lateral_of_line(g, line);
+        const RestPlace rest = field.rest_in_plane({lateral, r_mm});
+        const double v = rest.lateral_mm - lateral, per_mm = g.fan ? 1 / g.radius_mm : 0;
+        const double grow = 1 + rest.depth_mm * per_mm;
+        s = {rest.depth_mm - r_mm - 0.5 * v * v * per_mm * grow, v * grow, rest.tilt};
     }
-    const double lateral = lateral_of_line(g, line);
-    const RestPlace rest = field.rest_in_plane({lateral, r_mm});
-    const double v = rest.lateral_mm - lateral, per_mm = g.fan ? 1 / g.radius_mm : 0;
-    const double grow = 1 + rest.depth_mm * per_mm;
-    return {rest.depth_mm - r_mm - 0.5 * v * v * per_mm * grow, v * grow, rest.tilt};
+    if (!field.pools().empty()) shift_by_pools(field.pools(), beam, r_mm, s);
+    return s;
 }
 
 // The place at rest itself, in the plane.

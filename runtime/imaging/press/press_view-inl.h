@@ -46,7 +46,7 @@ class BetweenNodes {
 // PlaneShift::tilt of sample k; line: the vector's first beam.
 template <class D>
 HWY_INLINE hn::Vec<D> press_tilt(D d, const PressView& v, int line, int k) {
-    if (!v.pressed) return hn::Zero(d);
+    if (!v.pressed || k >= v.capacity) return hn::Zero(d);
     return BetweenNodes<D>(d, v,
                            line)(v.tilt.data() + static_cast<std::ptrdiff_t>(k) * v.node_stride);
 }
@@ -94,9 +94,10 @@ HWY_INLINE V at_place(D d, const PressView& v, const std::vector<float>& plane, 
     const auto bounded = [&](V x, int last) HWY_ATTR {
         return hn::Min(hn::Max(x, hn::Zero(d)), hn::Set(d, static_cast<float>(last)));
     };
-    const auto n = bounded(node, v.node_stride - 1), k = bounded(sample, v.active - 1);
+    const int rows = std::min(v.active, v.capacity);
+    const auto n = bounded(node, v.node_stride - 1), k = bounded(sample, rows - 1);
     const auto ni = hn::Min(hn::ConvertTo(di, n), hn::Set(di, v.node_stride - 2)),
-               ki = hn::Min(hn::ConvertTo(di, k), hn::Set(di, std::max(v.active - 2, 0)));
+               ki = hn::Min(hn::ConvertTo(di, k), hn::Set(di, std::max(rows - 2, 0)));
     const auto across = hn::Sub(n, hn::ConvertTo(d, ni)), down = hn::Sub(k, hn::ConvertTo(d, ki));
     const auto place = hn::Add(hn::Mul(ki, hn::Set(di, v.node_stride)), ni);
     const auto row = [&](const float* from) HWY_ATTR {
@@ -136,13 +137,53 @@ HWY_INLINE bool needle_lanes(D d, const PressView& v, const PlaceLanes<D>& p, V&
     return true;
 }
 
-// PlaneShift of places anywhere: first back by the needle, then by the probe from there.
 template <class D>
 struct ShiftLanes {
     hn::Vec<D> along, side;
 };
+
+// shift_by_pools() in lanes.
 template <class D>
-HWY_INLINE ShiftLanes<D> shift_lanes(D d, const PressView& v, const PlaceLanes<D>& p) {
+HWY_INLINE void pool_lanes(D d, const PressView& v, const PlaceLanes<D>& p, ShiftLanes<D>& s) {
+    const auto number = [&](double x) HWY_ATTR { return hn::Set(d, static_cast<float>(x)); };
+    const auto one = number(1);
+    auto x = hn::Add(p.x, hn::Add(hn::Mul(s.along, p.dx), hn::Mul(s.side, p.dz)));
+    auto z = hn::Add(p.z, hn::Sub(hn::Mul(s.along, p.dz), hn::Mul(s.side, p.dx)));
+    for (const SceneChange::Pool& pool : v.field->pools()) {
+        const auto ax = hn::Sub(x, number(pool.centre.x)), az = hn::Sub(z, number(pool.centre.z));
+        const auto y2 = number(pool.centre.y * pool.centre.y);
+        const auto r2 = hn::Add(hn::Add(hn::Mul(ax, ax), hn::Mul(az, az)), y2);
+        const auto radii2 = hn::Mul(r2, number(1 / (pool.radius_mm * pool.radius_mm)));
+        const auto near = hn::Lt(radii2, number(kPoolReaches * kPoolReaches));
+        if (hn::AllFalse(d, near)) continue;
+        const auto radii = hn::Sqrt(hn::Max(radii2, one));  // within the pool: of its surface
+        const auto u = hn::Mul(hn::Max(hn::Sub(radii, number(kPoolFadesFrom)), hn::Zero(d)),
+                               number(1 / (kPoolReaches - kPoolFadesFrom)));
+        const auto fades = hn::Sub(one, hn::Mul(hn::Mul(u, u), hn::Sub(number(3), hn::Add(u, u))));
+        const auto kept =
+            hn::Sub(one, hn::Div(hn::Mul(number(1 - kPoolCore * kPoolCore * kPoolCore), fades),
+                                 hn::Mul(hn::Mul(radii, radii), radii)));
+        auto root = hn::Add(number(kPoolCore), hn::Mul(number(1 - kPoolCore), kept));
+        for (int step = 0; step < 2; ++step) {
+            const auto cube = hn::Mul(hn::Mul(root, root), root);
+            root = hn::Mul(root, hn::Div(hn::Add(cube, hn::Add(kept, kept)),
+                                         hn::Add(hn::Add(cube, cube), kept)));
+        }
+        const auto back = hn::IfThenElseZero(near, hn::Sub(root, one));
+        const auto bx = hn::Mul(back, ax), bz = hn::Mul(back, az);
+        x = hn::Add(x, bx);
+        z = hn::Add(z, bz);
+        s.along = hn::Add(s.along, hn::Add(hn::Mul(bx, p.dx), hn::Mul(bz, p.dz)));
+        s.side = hn::Add(s.side, hn::Sub(hn::Mul(bx, p.dz), hn::Mul(bz, p.dx)));
+    }
+}
+
+// PlaneShift of places anywhere but for pools: first back by the needle, then by the probe from
+// there.
+template <class D>
+HWY_INLINE ShiftLanes<D> shift_by_needle_and_probe(D d,
+                                                   const PressView& v,
+                                                   const PlaceLanes<D>& p) {
     auto by = hn::Zero(d), aside = hn::Zero(d);
     if (v.field->needle().moves()) (void)needle_lanes(d, v, p, by, aside);
     if (!v.pressed) return {hn::Neg(by), hn::Neg(aside)};
@@ -175,6 +216,14 @@ HWY_INLINE ShiftLanes<D> shift_lanes(D d, const PressView& v, const PlaceLanes<D
     const auto sample = hn::Sub(hn::Mul(hn::Sub(p.r, by), number(1 / g.step_mm)), number(0.5));
     return {hn::Sub(at_place(d, v, v.along, node, sample), by),
             hn::Sub(at_place(d, v, v.side, node, sample), aside)};
+}
+
+// PlaneShift of places anywhere.
+template <class D>
+HWY_INLINE ShiftLanes<D> shift_lanes(D d, const PressView& v, const PlaceLanes<D>& p) {
+    ShiftLanes<D> shift = shift_by_needle_and_probe(d, v, p);
+    if (!v.field->pools().empty()) pool_lanes(d, v, p, shift);
+    return shift;
 }
 
 // 1 where places, shifted like this, lie in a collapsed lumen.
@@ -225,24 +274,25 @@ HWY_NOINLINE void press_chunk(
     const hn::RebindToSigned<D> di;
     const int line = first_beam + beam;
     const BetweenNodes<D> between(d, v, line);
-    const bool dents = v.dents(first_beam, first, rows);
+    const bool dents = v.dents(first_beam, first, rows), pushes = v.pushes(first_beam, first, rows);
     out.first = first;
     for (int row = -1; row < rows; ++row) {
         const int k = std::max(first + row, 0);
         const std::ptrdiff_t nodes = static_cast<std::ptrdiff_t>(k) * v.node_stride;
         auto along = hn::Zero(d), side = hn::Zero(d);
-        if (v.pressed) {
+        if (v.pressed && k < v.capacity) {
             along = between(v.along.data() + nodes);
-            if (row >= 0) side = between(v.side.data() + nodes);
+            if (row >= 0 || pushes) side = between(v.side.data() + nodes);
         }
-        if (dents) {
+        if (dents || pushes) {
             const PlaceLanes<D> places = places_of_beams(d, v, line, k);
+            ShiftLanes<D> shift{along, side};
             auto by = hn::Zero(d), aside = hn::Zero(d);
-            if (needle_lanes(d, v, places, by, aside)) {
-                const ShiftLanes<D> shift = shift_lanes(d, v, places);
-                along = shift.along;
-                side = shift.side;
-            }
+            if (dents && needle_lanes(d, v, places, by, aside))
+                shift = shift_by_needle_and_probe(d, v, places);
+            if (pushes) pool_lanes(d, v, places, shift);
+            along = shift.along;
+            side = shift.side;
         }
         hn::Store(along, d, out.along + (row + 1) * kPressBeams + beam);
         if (row >= 0) hn::Store(side, d, out.side + row * kPressBeams + beam);

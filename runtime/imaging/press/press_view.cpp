@@ -183,37 +183,56 @@ PressView::PressView(const ScanGeometry& g, const PressFace& face)
 }
 
 PressView::Shift PressView::at(int line, int k) const {
+    const auto exact = [&](PlaneShift s) {
+        return Shift{static_cast<float>(s.along_mm), static_cast<float>(s.side_mm)};
+    };
+    const int l = std::min(line, geometry->scanlines - 1);
+    const ScanGeometry::Beam& beam = geometry->beams[l];
+    const double r = (k + 0.5) * geometry->step_mm;
     if (field->needle().moves()) {
-        const int l = std::min(line, geometry->scanlines - 1);
-        const ScanGeometry::Beam& beam = geometry->beams[l];
-        const double r = (k + 0.5) * geometry->step_mm;
         const Point3 p{beam.origin.x + r * beam.direction.x, 0,
                        beam.origin.z + r * beam.direction.z};
         const Vector3 away = p - field->needle().tip;
-        if (dot(away, away) < kDentReachMm * kDentReachMm) {
-            const PlaneShift s = plane_shift(*field, *geometry, beam, l, r);
-            return {static_cast<float>(s.along_mm), static_cast<float>(s.side_mm)};
-        }
+        if (dot(away, away) < kDentReachMm * kDentReachMm)
+            return exact(plane_shift(*field, *geometry, beam, l, r));
     }
-    return by_probe(line, k);
+    const Shift probe = by_probe(line, k);
+    if (field->pools().empty()) return probe;
+    PlaneShift s{double{probe.along_mm}, double{probe.side_mm}, 0};
+    shift_by_pools(field->pools(), beam, r, s);
+    return exact(s);
 }
 
-bool PressView::dents(int line, int first, int rows) const {
-    const NeedleDent& needle = field->needle();
-    if (!needle.moves()) return false;
-    // The stretch lies in a circle about its middle.
+double PressView::circle_around(int line, int first, int rows, Point3& middle) const {
     const auto corner = [&](int l, int k) {
         const int at = std::min(l, lines - 1);
         const double r = (k + 0.5) * static_cast<double>(step_mm);
         const auto number = [&](int row) { return static_cast<double>(beam_row(row)[at]); };
         return Point3{number(0) + r * number(2), 0, number(1) + r * number(3)};
     };
-    const Point3 middle = corner(line + kPressBeams / 2, first + rows / 2);
+    middle = corner(line + kPressBeams / 2, first + rows / 2);
     double reach = 0;
     for (const int l : {line, line + kPressBeams - 1})
         for (const int k : {first, first + rows - 1})
             reach = std::max(reach, norm(corner(l, k) - middle));
+    return reach;
+}
+
+bool PressView::dents(int line, int first, int rows) const {
+    const NeedleDent& needle = field->needle();
+    if (!needle.moves()) return false;
+    Point3 middle;
+    const double reach = circle_around(line, first, rows, middle);
     return norm(needle.tip - middle) < reach + kDentReachMm;
+}
+
+bool PressView::pushes(int line, int first, int rows) const {
+    if (field->pools().empty()) return false;
+    Point3 middle;
+    const double reach = circle_around(line, first, rows, middle) + field->farthest_mm();
+    for (const SceneChange::Pool& pool : field->pools())
+        if (norm(pool.centre - middle) < reach + kPoolReaches * pool.radius_mm) return true;
+    return false;
 }
 
 // Fills the planes for phased arrays, whose beams cross columns: every other sample of the nodes is
@@ -258,9 +277,10 @@ void PressView::show(SimdTarget simd, const PressField& now) {
             cross_columns();
         }
     }
-    // A needle may dent any sample.
-    const int needed = now.needle().moves() ? capacity : moving;
-    active = std::min(capacity, (needed + kPressRows - 1) / kPressRows * kPressRows);
+    active = std::min(capacity, (moving + kPressRows - 1) / kPressRows * kPressRows);
+    if (!pressed) active = 0;
+    // A needle and a pool may move any sample.
+    if (now.needle().moves() || !now.pools().empty()) active = geometry->samples;
 }
 
 }  // namespace sonocase::runtime::press

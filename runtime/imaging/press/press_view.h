@@ -4,8 +4,8 @@
 // block of beams as the kernels read it.
 //
 // The probe's shift is worked out for every few beams (nodes, at most 0.7 columns of the field
-// apart) at every sample, and is linear between nodes, so that rows need no look-ups. A needle's
-// shift is narrower, and is added sample by sample near its tip.
+// apart) at every sample, and is linear between nodes, so that rows need no look-ups. The shifts by
+// a needle and by pools are narrower, and are added sample by sample near them.
 #pragma once
 
 #include <cstdint>
@@ -44,9 +44,10 @@ class PressView {
     // False where nothing moves in the samples [first, first + rows) of the beams [line, line +
     // kPressBeams).
     bool moves(int line, int first, int rows) const {
-        return first < active && (pressed || dents(line, first, rows));
+        return first < active && (pressed || dents(line, first, rows) || pushes(line, first, rows));
     }
-    bool dents(int line, int first, int rows) const;
+    bool dents(int line, int first, int rows) const;   // a needle does
+    bool pushes(int line, int first, int rows) const;  // a pool does
 
     // The shift of one sample, k < active; line <= lines. by_probe: the probe's shift alone.
     struct Shift {
@@ -54,7 +55,7 @@ class PressView {
     };
     Shift at(int line, int k) const;
     Shift by_probe(int line, int k) const {
-        if (!pressed) return {};
+        if (!pressed || k >= capacity) return {};
         const std::ptrdiff_t node =
             static_cast<std::ptrdiff_t>(k) * node_stride + (line >> every_log2);
         const float part = part_of[line & (every - 1)];
@@ -68,7 +69,7 @@ class PressView {
     bool pressed = false;  // by the probe
     bool columns_follow_beams = true;
     int lines = 0;
-    // Samples of the planes, a whole number of stretches; nothing ever moves below them.
+    // Samples of the planes, a whole number of stretches or all; the probe moves nothing below.
     int capacity = 0;
     int active = 0;  // samples from here on move by less than kStillMm in the field shown
     float step_mm = 1, columns_per_mm = 1, per_radius_mm = 0;
@@ -93,6 +94,8 @@ class PressView {
 
   private:
     void cross_columns();
+    // The middle and radius of a circle, in the plane, around a stretch.
+    double circle_around(int line, int first, int rows, Point3& middle) const;
 
     const PressField* shown_ = nullptr;
     std::uint32_t version_ = 0;

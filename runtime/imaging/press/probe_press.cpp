@@ -3,6 +3,7 @@
 #include "runtime/imaging/press/probe_press.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace sonocase::runtime::press {
@@ -76,6 +77,19 @@ double ProbePress::press_mm_for(const Rigid& pose, double force_n, double start_
         }
     }
     return at;
+}
+
+void ProbePress::set_pools(std::span<const SceneChange::Pool> pools) {
+    std::array<SceneChange::Pool, SceneChange::kMaxPools> seen;
+    std::size_t count = 0;
+    for (SceneChange::Pool pool : pools.first(std::min(pools.size(), seen.size()))) {
+        pool.centre = from_mannequin_ * pool.centre;
+        if (!(pool.radius_mm >= kLeastPoolMm) || !std::isfinite(norm(pool.centre - Point3{})))
+            continue;
+        pool.centre.z += field_.state().excess_mm;  // from the face where bone holds it
+        seen[count++] = pool;
+    }
+    field_.set_pools({seen.data(), count});
 }
 
 Point3 ProbePress::at_rest(Point3 now) const {

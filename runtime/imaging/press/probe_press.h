@@ -30,6 +30,9 @@ class ProbePress {
     void set_venous_pressure(double mmhg);
     // A needle that moves tissue, in the frame of the pose that at() returned.
     void dent(const NeedleDent& needle) { field_.dent(needle); }
+    // Pools that move tissue, where they are now in the frame `mannequin`; those that are none are
+    // left out.
+    void set_pools(std::span<const SceneChange::Pool> pools);
 
     // The depth of pressing, [0, kMaxPressMm], at which the force is force_n. Solves at most six
     // times, beginning at start_mm.

@@ -3,6 +3,7 @@
 #include "runtime/imaging/truth/frame_truth.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <cstring>
@@ -122,6 +123,12 @@ void TruthRenderer::Impl::press(FrameInput& input, bool wants_entry) {
         const NeedlePose& in = input.needle;
         probe->dent(needle_shape_of(input, s) ? bounded_dent(s.tip, s.axis, in.tent_mm, in.drag_mm)
                                               : NeedleDent{});
+        std::array<SceneChange::Pool, SceneChange::kMaxPools> pools = input.change.pools;
+        for (SceneChange::Pool& pool : pools)
+            pool.centre = anatomy.moved(pool.centre, input.time_s);
+        const bool draws = options.model == ImageModel::physical && exercise.procedure.given();
+        const int count = std::clamp(input.change.pool_count, 0, SceneChange::kMaxPools);
+        probe->set_pools({pools.data(), draws ? static_cast<std::size_t>(count) : 0});
         pressed = probe->moving();
         if (pressed != nullptr) press_view->show(simd, *pressed);
     }

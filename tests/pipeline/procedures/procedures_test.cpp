@@ -516,6 +516,28 @@ TEST(Procedures, AnInjectionIntoBoneIsLostAndOneUnderItIsKept) {
     EXPECT_NEAR(4.0 / 3 * kPi * std::pow(pool.radius_mm, 3) / 1000, 3, 1e-9);
 }
 
+// What was injected before the vein pushes it away from the needle, in the picture and for the tip.
+TEST(Procedures, FluidBeforeAVeinPushesItAwayFromTheTip) {
+    Held held("central-line");
+    const Vector3 way = normalized(Vector3{-0.2971, -0.6417, -0.7071});
+    const Point3 vein = held.exercise().targets[0].centre;
+    Point3 wall = vein;
+    const int blood = held.body().label(vein);
+    while (held.body().label(wall) == blood) wall = wall - 0.1 * way;
+    held.at(wall + 1 * way, way, "aspirate=1");
+    EXPECT_EQ(held.drawn(), "blood");
+    const ProcedureState& state = held.at(wall - 2 * way, way, "inject=2");
+    ASSERT_EQ(state.pool_count, 1);
+    ASSERT_EQ(state.injected_ml, 2);
+    // A ball of 2 ml has a radius of 7.8 mm: the wall, 2 mm before it, moves to 8 mm.
+    held.at(wall + 1 * way, way, "aspirate=1");
+    EXPECT_EQ(held.drawn(), "nothing");
+    held.at(wall + 4 * way, way, "aspirate=1");
+    EXPECT_EQ(held.drawn(), "nothing");
+    held.at(wall + 7 * way, way, "aspirate=1");
+    EXPECT_EQ(held.drawn(), "blood");
+}
+
 TEST(Procedures, FreeFluidRunsToWhereIsLowestAndLeavesWithTheDrain) {
     Held held("paracentesis");
     const FreeFluid& fluid = held.exercise().free_fluid;

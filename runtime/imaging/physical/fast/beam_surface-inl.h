@@ -322,6 +322,13 @@ HWY_INLINE void target_row(
                 hn::Max(about.length, hn::Set(d, 1e-3f)));
     const auto within = hn::RebindMask(di, hn::And(close, hn::Lt(distance, zero)));
     hn::Store(hn::IfThenElse(within, hn::Set(di, ball.acoustics), own), di, c.label.row(row));
+    if (ball.covers) {
+        const auto inner = hn::RebindMask(d, within);
+        for (float* of : {c.echo_re.row(row), c.echo_im.row(row)})
+            hn::Store(hn::IfThenZeroElse(inner, hn::Load(d, of)), d, of);
+        float* facing = c.facing.row(row);
+        hn::Store(hn::IfThenElse(inner, hn::Set(d, 1.0f), hn::Load(d, facing)), d, facing);
+    }
     if (b.interfaces) {
         const auto u = hn::Mul(distance, hn::Set(d, 1 / 0.16f));
         const auto c2 = hn::Mul(cosine, cosine);

@@ -110,6 +110,7 @@ PhysicalTarget packed(const TargetBall& t) {
             .wall = static_cast<float>(t.wall),
             .fluid = t.fluid,
             .anywhere = t.anywhere,
+            .covers = t.covers,
             .only_label = t.only_label,
             .level_up = {static_cast<float>(t.level_up.x), static_cast<float>(t.level_up.y),
                          static_cast<float>(t.level_up.z)},
@@ -664,7 +665,7 @@ void PhysicalFast::prepare_nodes(const Tables& tables) {
 // Moves nodes from where the beams run to where their tissue lies at rest.
 void PhysicalFast::press_nodes(int first, int end) {
     NodeLattice& n = nodes_;
-    const bool dents = press_.field->needle().moves();
+    const bool local = press_.field->needle().moves() || !press_.field->pools().empty();
     for (int node = first; node < end; ++node) {
         const int line = n.spacing.line(node);
         float along[3], side[3];
@@ -676,7 +677,7 @@ void PhysicalFast::press_nodes(int first, int end) {
             const int k = row * n.spacing.samples;
             if (k >= press_.active) break;
             const press::PressView::Shift shift =
-                dents ? press_.at(line, k) : press_.by_probe(line, k);
+                local ? press_.at(line, k) : press_.by_probe(line, k);
             const std::size_t at = n.at(row, node);
             n.x[at] += along[0] * shift.along_mm + side[0] * shift.side_mm;
             n.y[at] += along[1] * shift.along_mm + side[1] * shift.side_mm;

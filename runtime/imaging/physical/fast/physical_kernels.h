@@ -85,6 +85,7 @@ struct PhysicalTarget {
     float wall = 0;
     bool fluid = false;
     bool anywhere = false;  // shows in fluid as well
+    bool covers = false;    // hides the surfaces of the tissue in it
     // Free fluid (TargetBall): the label that it takes the place of, -1: no free fluid; a plane.
     std::int32_t only_label = -1;
     float level_up[3] = {};

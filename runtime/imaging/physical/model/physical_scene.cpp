@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "formats/exercise/pool_shift.h"
 #include "formats/pathology/pathology_kinds.h"
 #include "formats/volume/tissue.h"
 #include "runtime/imaging/physical/model/physical_model.h"
@@ -333,8 +334,9 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
 void balls_of_frame(const PhysicalScene& scene,
                     const SceneChange& change,
                     int first_target,
+                    const Matrix3* pushed_axes,
                     std::vector<TargetBall>& balls) {
-    constexpr double kSmallestMm = 0.4;  // what is smaller is gone
+    constexpr double kSmallestMm = kLeastPoolMm;  // what is smaller is gone
     balls.clear();
     if (scene.free_fluid && change.has_level) {  // everything else lies in it
         balls.push_back(*scene.free_fluid);
@@ -357,9 +359,16 @@ void balls_of_frame(const PhysicalScene& scene,
         TargetBall ball;
         ball.centre_vx = scene.grid.voxel_from_point(pool.centre);
         ball.radius_mm = ball.reach_mm = pool.radius_mm;
+        if (pushed_axes != nullptr) {  // in the plane, places at rest are at kPoolCore of the way
+            ball.radius_mm *= kPoolCore;
+            ball.round = false;
+            ball.shape = *pushed_axes * Matrix3::diagonal({1, kPoolCore * kPoolCore, 1}) *
+                         transpose(*pushed_axes);
+        }
         ball.acoustics = pool.blood ? scene.blood_pool : scene.clear_pool;
         ball.wall = pool.blood ? 0.5 : 2;
         ball.fluid = !pool.blood;
+        ball.covers = true;
         balls.push_back(ball);
     }
     // An ellipsoid as long as the line; as thick as the slab shows it at least.

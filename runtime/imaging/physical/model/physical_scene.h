@@ -53,6 +53,7 @@ struct TargetBall {
     double wall = 0;      // amplitude of its surface
     bool fluid = false;
     bool anywhere = false;  // shows in fluid as well: a wire or catheter
+    bool covers = false;    // hides the surfaces of the tissue in it: a pool
     // Free fluid: it has no surface of its own, takes the place of this label alone, and ends at a
     // plane so far above the centre; up: unit vector in the volume.
     int only_label = -1;
@@ -128,11 +129,15 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
 
 // The balls of a frame: the scene's, with the exercise's targets as large as they still are, and
 // what acts have put between them. first_target: number of shown lesions before the targets.
+// pushed_axes: the probe's axes, where pools have pushed tissue aside in its plane
+// (formats/exercise/pool_shift.h), so that their fluid takes the place of what is left within them;
+// null: they lie in place of the tissue.
 // balls: cleared; allocates nothing within kMaxFrameBalls.
 inline constexpr std::size_t kMaxFrameBalls = physical::kMaxTargets + SceneChange::kMaxPools + 5;
 void balls_of_frame(const PhysicalScene& scene,
                     const SceneChange& change,
                     int first_target,
+                    const Matrix3* pushed_axes,
                     std::vector<TargetBall>& balls);
 
 }  // namespace sonocase::runtime

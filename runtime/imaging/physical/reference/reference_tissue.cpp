@@ -269,6 +269,10 @@ void meet_targets(const ReferenceInput& in, Vector3 beam, Sample& p) {
         if (t.only_label >= 0 || !gives_way(in, p, t)) continue;
         const NearTarget near = near_target(in, t, p.v);
         if (!near.reached) continue;
+        if (t.covers && near.distance_mm < 0) {
+            p.re = p.im = 0;
+            p.facing = 1;
+        }
         const Roughness rough = roughness_at(in.scene, p.v);
         const double cosine = std::abs(dot(near.normal, beam));
         if (in.frame.effects.interfaces) {
