@@ -43,11 +43,13 @@ inline double pool_share(double r_mm, double radius_mm) {
     return root;
 }
 
-// Where the tissue lay that pools have pushed to p.
+// Where the tissue lay that pools have pushed to p; within a pool: its centre.
 inline Point3 before_pools(std::span<const SceneChange::Pool> pools, Point3 p) {
     for (const SceneChange::Pool& pool : pools) {
         const Vector3 away = p - pool.centre;
-        p = pool.centre + pool_share(norm(away), pool.radius_mm) * away;
+        const double r_mm = norm(away);
+        const bool within = r_mm <= pool.radius_mm && pool.radius_mm >= kLeastPoolMm;
+        p = pool.centre + (within ? 0 : pool_share(r_mm, pool.radius_mm)) * away;
     }
     return p;
 }

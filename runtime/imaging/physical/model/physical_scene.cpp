@@ -361,6 +361,7 @@ void balls_of_frame(const PhysicalScene& scene,
         ball.radius_mm = ball.reach_mm = pool.radius_mm;
         if (pushed_axes != nullptr) {  // in the plane, places at rest are at kPoolCore of the way
             ball.radius_mm *= kPoolCore;
+            ball.anywhere = true;  // a vessel that is left in the core is not seen
             ball.round = false;
             ball.shape = *pushed_axes * Matrix3::diagonal({1, kPoolCore * kPoolCore, 1}) *
                          transpose(*pushed_axes);
