@@ -791,6 +791,7 @@ void PhysicalFast::show_faces(int line, PhysicalBlock& b) const {
     if (std::all_of(dome, dome + kBeamBlock, [](float mm) { return mm >= kNoFace; })) return;
     b.dome_mm = dome;
     b.dome_scale = static_cast<float>(tables_.dome_scale);
+    b.mirror_light = static_cast<float>(std::pow(10.0, kMirrorDb / 20));
 }
 
 // Fills in the wall at the beams of a block (first: its first beam), and which rows of nodes can

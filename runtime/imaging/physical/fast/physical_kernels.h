@@ -147,7 +147,7 @@ struct PhysicalBlock {
     const float* face_mm = nullptr;          // per beam: face of gas; null: not known
     const float *face_peak = nullptr, *cosine = nullptr;
     const float* dome_mm = nullptr;  // null: none
-    float dome_scale = 1;
+    float dome_scale = 1, mirror_light = 0;
     const PhysicalStreak* streaks = nullptr;
     int streak_count = 0;
     const float* plane = nullptr;  // beams in the plane, `lines` apart: origin x, z, direction x, z
