@@ -88,7 +88,7 @@ HWY_INLINE void light_gas(D d, M lit, V light_and_gain, V facing, V depth, BeamL
 }
 
 // Starts them at the frame's faces of gas (model/gas_faces.h), with the light shortly before the
-// face and a direction that neighbouring beams share. Behind the diaphragm it is black.
+// face and a direction that neighbouring beams share. The diaphragm starts none.
 template <class D>
 HWY_INLINE void light_face(D d, const PhysicalBlock& b, int beam, int k, BeamLight<D>& t) {
     using namespace physical;
@@ -143,13 +143,17 @@ HWY_INLINE void light_tails(D d,
     }
 }
 
-// Effect diaphragm: the light stays until the line is drawn, and is gone behind it.
+// Effect diaphragm: the light stays while the line is drawn, and its mirror image has less of it.
 template <class D, class V>
 HWY_INLINE V behind_dome(D d, const PhysicalBlock& b, int beam, int k, V left) {
     const auto past = hn::Sub(hn::Set(d, b.r[k]), hn::LoadU(d, b.dome_mm + beam));
-    const auto reach = hn::Set(d, static_cast<float>(physical::kDomeReachMm));
-    const auto near = hn::Gt(past, hn::Set(d, -1.0f));
-    return hn::IfThenElse(near, hn::IfThenElseZero(hn::Lt(past, reach), hn::Set(d, 1.0f)), left);
+    const auto near = hn::And(hn::Gt(past, hn::Set(d, static_cast<float>(-physical::kDomeClearMm))),
+                              hn::Lt(past, hn::Set(d, static_cast<float>(physical::kDomeReachMm))));
+    const auto from = hn::Set(d, static_cast<float>(physical::kMirrorMm));
+    const auto starts =
+        hn::And(hn::Lt(past, from), hn::Ge(hn::Add(past, hn::Set(d, b.step_mm)), from));
+    const auto one = hn::Set(d, 1.0f), mirror = hn::Set(d, b.mirror_light);
+    return hn::IfThenElse(near, hn::IfThenElse(starts, mirror, one), left);
 }
 
 // Reverberation between layers, below what is bright: each sample leaves a part of its power.

@@ -43,6 +43,11 @@ struct BeamWalk {
     HWY_INLINE BeamPoint<D> at(D d, const PhysicalBlock& b, int beam, int k) const {
         auto s = hn::Add(hn::Set(d, b.r[k]), hn::Mul(gap, hn::Set(d, b.contact[k])));
         if (b.press != nullptr) s = hn::Add(s, hn::Load(d, b.press->along_row(k) + beam));
+        if (b.dome_mm != nullptr) {  // physical::mirrored_mm()
+            const auto behind =
+                hn::Min(hn::Sub(hn::LoadU(d, b.dome_mm + beam), hn::Set(d, b.r[k])), hn::Zero(d));
+            s = hn::Add(s, hn::Add(behind, behind));
+        }
         BeamPoint<D> p{hn::Add(ox, hn::Mul(vx, s)), hn::Add(oy, hn::Mul(vy, s)),
                        hn::Add(oz, hn::Mul(vz, s))};
         if (b.press != nullptr) {

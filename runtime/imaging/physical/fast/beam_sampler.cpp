@@ -132,9 +132,12 @@ void needle_physical(PhysicalBlock& b, const NeedleRow& n, int row_begin, int ro
                 const auto r = hn::Set(d, b.r[k]);
                 const auto chord =
                     needle_chord(d, n, hn::Add(ox, hn::Mul(r, dx)), hn::Add(oz, hn::Mul(r, dz)));
-                const auto seen = hn::Min(
+                auto seen = hn::Min(
                     hn::IfThenElseZero(chord.hit, hn::Div(chord.length_mm, hn::Set(d, diameter))),
                     one);
+                // What is there behind the diaphragm is a mirror image of something else.
+                if (b.dome_mm != nullptr)
+                    seen = hn::IfThenElseZero(hn::Lt(r, hn::LoadU(d, b.dome_mm + v)), seen);
                 const auto tip_part =
                     hn::Max(hn::Min(hn::Sub(hn::Set(d, 2.0f), chord.from_tip_mm), one), zero);
                 const auto base = hn::Add(rough, hn::Mul(hn::Sub(tip, rough), tip_part));

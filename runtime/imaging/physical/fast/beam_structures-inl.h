@@ -19,20 +19,22 @@
 HWY_BEFORE_NAMESPACE();
 namespace sonocase::runtime::HWY_NAMESPACE {
 
-// A sheet's echo by its distance, times the fourth power of the cosine: the slope of the distance
-// along the beam.
+// A sheet's echo by its course (a whole number) and its distance, times the fourth power of the
+// cosine: the slope of the distance along the beam.
 template <class D, class V>
-HWY_INLINE V sheet_echo(D d, const float* table, int size, V distance, V slope) {
-    using namespace physical;
-    const auto step = hn::Add(
-        hn::Mul(hn::Add(distance, hn::Set(d, float(kWallBeforeMm))), hn::Set(d, float(kWallSteps))),
-        hn::Set(d, 0.5f));
-    const auto within =
-        hn::Min(hn::Max(step, hn::Zero(d)), hn::Set(d, static_cast<float>(size - 1)));
-    const auto echo = hn::GatherIndex(d, table, hn::ConvertTo(hn::RebindToSigned<D>(), within));
+HWY_INLINE V
+sheet_echo(D d, const float* table, int steps, float steps_per_mm, V course, V distance, V slope) {
+    const auto step =
+        hn::Add(hn::Mul(distance, hn::Set(d, steps_per_mm)),
+                hn::Set(d, static_cast<float>(physical::kWallBeforeMm) * steps_per_mm + 0.5f));
+    const hn::RebindToSigned<D> di;
+    const auto within = hn::ConvertTo(
+        di, hn::Min(hn::Max(step, hn::Zero(d)), hn::Set(d, static_cast<float>(steps - 1))));
+    const auto echo = hn::GatherIndex(
+        d, table,
+        hn::Add(hn::ConvertTo(di, hn::Mul(course, hn::Set(d, static_cast<float>(steps)))), within));
     const auto c2 = hn::Min(hn::Mul(slope, slope), hn::Set(d, 1.0f));
-    const auto c4 = hn::Mul(c2, c2);
-    return hn::Mul(echo, c4);
+    return hn::Mul(echo, hn::Mul(c2, c2));
 }
 
 // Draws the wall's sheets in a stretch.
@@ -65,22 +67,25 @@ HWY_NOINLINE void wall_chunk(D d, PhysicalBlock& b, BeamChunk& c) {
         };
         auto outer_slope = zero, inner_slope = zero, unused = zero;
         const auto depth = between(wall.depth, outer_slope),
-                   above = between(wall.above, inner_slope),
-                   strength = between(wall.strength, unused);
-        const auto outer = sheet_echo(d, wall.outer, wall.outer_size, depth, outer_slope);
-        const auto inner = sheet_echo(d, wall.inner, wall.inner_size, above, inner_slope);
+                   above = between(wall.above, inner_slope), noise = between(wall.course, unused);
+        const auto number = hn::Add(hn::Mul(noise, hn::Set(d, static_cast<float>(kCoursesPerUnit))),
+                                    hn::Set(d, 0.5f * kWallCourses));
+        const auto course = hn::Floor(
+            hn::Min(hn::Max(number, zero), hn::Set(d, static_cast<float>(kWallCourses - 1))));
+        const auto outer = sheet_echo(d, wall.outer, wall.outer_steps, wall.steps_per_mm, course,
+                                      depth, outer_slope);
+        const auto inner = sheet_echo(d, wall.inner, wall.inner_steps, wall.steps_per_mm, course,
+                                      above, inner_slope);
         const auto share = hn::Min(
             hn::Max(
                 hn::Add(half, hn::Mul(hn::Sub(above, depth), hn::Set(d, float(1 / kWallBlendMm)))),
                 zero),
             one);
-        const auto level = exp2_near(d, hn::Mul(strength, hn::Set(d, float(1 / kDbPerLog2))));
         const auto sum = hn::Add(hn::Mul(outer, share), hn::Mul(inner, hn::Sub(one, share)));
         const auto soft = hn::RebindMask(
             d, hn::Eq(hn::And(hn::Load(di, c.acoustics.row(row)), hn::Set(di, 7 << 16)),
                       hn::Set(di, static_cast<std::int32_t>(kPackedSoft) << 16)));
-        const auto echo = hn::IfThenElseZero(
-            soft, hn::Mul(hn::Mul(sum, level), hn::Set(d, b.interface_scale[k])));
+        const auto echo = hn::IfThenElseZero(soft, hn::Mul(sum, hn::Set(d, b.interface_scale[k])));
         if (c.offsets) {
             const auto max_structure = hn::Set(di, wall.max_structure);
             const auto baked = hn::Load(di, c.structure.row(row));

@@ -145,8 +145,7 @@ void layers_of_block(const LayerSearch& s) {
             const float wave = s.wave_mm * (p[2] * (1 / kNoise));
             s.depth[at] = p[0] * (1 / kMm) + wave;
             s.above[at] = p[1] * (1 / kMm) + wave + s.own_wave_mm * (p[3] * (1 / kNoise));
-            s.strength[at] =
-                std::min(s.strength_db * (p[3] * (1 / kNoise)), static_cast<float>(kMaxWallDb));
+            s.course[at] = p[3] * (1 / kNoise);
         }
     }
 }

@@ -53,8 +53,8 @@ struct LayerSearch {
     const NodeLattice* nodes = nullptr;
     int first = 0, rows = 0;
     const TissueLayers* layers = nullptr;
-    float wave_mm = 0, own_wave_mm = 0, strength_db = 0;  // from WallTables
-    float *depth = nullptr, *above = nullptr, *strength = nullptr;
+    float wave_mm = 0, own_wave_mm = 0;  // from WallTables
+    float *depth = nullptr, *above = nullptr, *course = nullptr;
 };
 void search_layers(SimdTarget simd, const LayerSearch& search);
 

@@ -652,10 +652,11 @@ void PhysicalFast::prepare_nodes(const Tables& tables) {
     w.per_mm = 1 / static_cast<float>(w.every * geometry_.step_mm);
     w.ground = static_cast<float>(16 * tables_.wall.ground_db);
     w.max_structure = 16 * tables_.wall.max_structure_db;
-    w.outer = sheets.outer.data();
-    w.inner = sheets.inner.data();
-    w.outer_size = static_cast<int>(sheets.outer.size());
-    w.inner_size = static_cast<int>(sheets.inner.size());
+    w.outer = sheets.outer.echo.data();
+    w.inner = sheets.inner.echo.data();
+    w.outer_steps = sheets.outer.steps;
+    w.inner_steps = sheets.inner.steps;
+    w.steps_per_mm = static_cast<float>(sheets.steps_per_mm);
     const int rows = wall_node_rows();
     wall_nodes_.assign(3 * rows * lines_ + kRowSlack, 0.0f);
     wall_active_.assign(rows * (lines_ / kBeamBlock), 0);
@@ -752,11 +753,10 @@ void PhysicalFast::search_nodes(const PhysicalFrame& f, const PhysicalBlock& bas
         if (!wall_shows_) return;
         float* out = layer_nodes_.data();
         const std::size_t plane = nodes_.at(nodes_.rows, 0);
-        search_layers(
-            context_.simd,
-            {&nodes_, first, wall_node_rows(), &scene_.layers,
-             static_cast<float>(tables_.wall.wave_mm), static_cast<float>(tables_.wall.own_wave_mm),
-             static_cast<float>(tables_.wall.strength_db), out, out + plane, out + 2 * plane});
+        search_layers(context_.simd, {&nodes_, first, wall_node_rows(), &scene_.layers,
+                                      static_cast<float>(tables_.wall.wave_mm),
+                                      static_cast<float>(tables_.wall.own_wave_mm), out,
+                                      out + plane, out + 2 * plane});
     });
     if (faces_found_) join_faces(geometry_, nodes_.spacing, faces_of_nodes_, faces_);
 }
@@ -792,6 +792,7 @@ void PhysicalFast::show_faces(int line, PhysicalBlock& b) const {
     if (std::all_of(dome, dome + kBeamBlock, [](float mm) { return mm >= kNoFace; })) return;
     b.dome_mm = dome;
     b.dome_scale = static_cast<float>(tables_.dome_scale);
+    b.mirror_light = static_cast<float>(std::pow(10.0, kMirrorDb / 20));
 }
 
 // Fills in the wall at the beams of a block (first: its first beam), and which rows of nodes can
@@ -803,13 +804,13 @@ void PhysicalFast::place_wall(bool keep_all, int first, PhysicalWall& w) {
     float* out = wall_nodes_.data() + first;
     w.depth = out;
     w.above = out + plane;
-    w.strength = out + 2 * plane;
+    w.course = out + 2 * plane;
     std::uint8_t* active =
         wall_active_.data() + static_cast<std::ptrdiff_t>(first / kBeamBlock) * rows;
     w.active = active;
     constexpr auto kBefore = static_cast<float>(kWallBeforeMm);
-    const float outer_end = static_cast<float>(w.outer_size) / kWallSteps - kBefore,
-                inner_end = static_cast<float>(w.inner_size) / kWallSteps - kBefore;
+    const float outer_end = static_cast<float>(w.outer_steps) / w.steps_per_mm - kBefore,
+                inner_end = static_cast<float>(w.inner_steps) / w.steps_per_mm - kBefore;
     const std::size_t node_plane = nodes_.at(nodes_.rows, 0);
     const int begin = node_of_[first], end = node_of_[first + kBeamBlock - 1] + 1;
     for (int row = 0; row < rows; ++row) {

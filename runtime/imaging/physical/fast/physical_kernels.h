@@ -55,10 +55,11 @@ inline constexpr int kBreathingNode = 16;  // samples between nodes of the breat
 
 // Effect wall: distances at nodes, `lines` of the block apart, and the tables of sheets.
 struct PhysicalWall {
-    const float *depth = nullptr, *above = nullptr, *strength = nullptr;
+    const float *depth = nullptr, *above = nullptr, *course = nullptr;
     const std::uint8_t* active = nullptr;  // per row of nodes: something shows below it
     const float *outer = nullptr, *inner = nullptr;
-    int outer_size = 0, inner_size = 0;
+    int outer_steps = 0, inner_steps = 0;  // of a course
+    float steps_per_mm = 1;
     int every = 1, rows = 0;          // samples between nodes; samples that can show a sheet
     float per_row = 1, per_mm = 1;    // one over samples, and over mm, between nodes
     float ground = 0;                 // level of the ground between sheets, 1/16 dB
@@ -147,7 +148,7 @@ struct PhysicalBlock {
     const float* face_mm = nullptr;          // per beam: face of gas; null: not known
     const float *face_peak = nullptr, *cosine = nullptr;
     const float* dome_mm = nullptr;  // null: none
-    float dome_scale = 1;
+    float dome_scale = 1, mirror_light = 0;
     const PhysicalStreak* streaks = nullptr;
     int streak_count = 0;
     const float* plane = nullptr;  // beams in the plane, `lines` apart: origin x, z, direction x, z

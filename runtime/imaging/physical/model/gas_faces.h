@@ -52,8 +52,11 @@ inline NodeSpacing node_spacing(const ScanGeometry& g, const Tables& t) {
 //     peak (exp(-(q / s)^2 / 2) + 0.12 exp(-|q| / 3.5 mm)),  s = 1.2 mm before, 1.5 mm behind
 //     peak = kDomeAmplitude (0.4 + 0.6 cos^2) 10^(2.5 dB strength / 20)
 // kDomeShare of it is added to the surfaces' echo, times Tables::dome_scale, and kDomeShare to the
-// scatterers'. Light is kept for kDomeReachMm behind it and then gone: black. The figures are
-// fitted to a tracked sweep of a living liver (docs/realism.md).
+// scatterers'. The figures are fitted to a tracked sweep of a living liver (docs/realism.md).
+//
+// The diaphragm is a mirror: what a beam shows behind it lies as far before it, on the same beam
+// (mirrored_mm()), kMirrorDb weaker from kMirrorMm behind the line on. That the beam turns aside
+// where it meets the diaphragm at a slant is left out.
 
 inline constexpr float kNoFace = 1e9f;
 inline constexpr int kFaceHalvings = 4;    // halvings of the stretch between two nodes
@@ -64,7 +67,14 @@ inline constexpr double kDomeAmplitude = 3.6, kDomeStrengthDb = 2.5, kDomeShare 
 inline constexpr double kDomeBeforeMm = 1.2, kDomeBehindMm = 1.5;
 inline constexpr double kDomeTail = 0.12, kDomeTailMm = 3.5;
 inline constexpr double kDomeReachMm = 8;
-inline constexpr double kDomeGasDb = 8;  // scatterers of the lung count as those of an organ
+inline constexpr double kDomeGasDb = 8;      // scatterers of the lung count as those of an organ
+inline constexpr double kDomeClearMm = 2.5;  // labels waver: gas before it takes no light there
+inline constexpr double kMirrorMm = 3, kMirrorDb = -14;
+
+// What is added to a depth to find where its tissue lies: 0 before the diaphragm.
+inline double mirrored_mm(double dome_mm, double r_mm) {
+    return 2 * std::min(dome_mm - r_mm, 0.0);
+}
 
 // One beam's face: depth along the beam (kNoFace: none).
 struct FaceNode {

@@ -84,10 +84,17 @@ void add_clutter(const ReferenceInput& in, const Sample& p, BeamLight& t) {
 }
 
 // Mirror, shadow and tail of the needle.
-void meet_needle(const ReferenceInput& in, PlanePoint o, PlanePoint d, Sample& p, BeamLight& t) {
+void meet_needle(const ReferenceInput& in,
+                 const Face& face,
+                 PlanePoint o,
+                 PlanePoint d,
+                 Sample& p,
+                 BeamLight& t) {
     if (!in.frame.effects.needle || in.frame.needle == nullptr) return;
     const NeedleShape& n = *in.frame.needle;
     const double r = p.row.r_mm;
+    // What is there behind the diaphragm is a mirror image of something else.
+    if (r >= face.dome_mm) return;
     double back = 0;
     const double share = needle_share(n, o.x + r * d.x, o.z + r * d.z, back);
     const double seen = std::min(share * n.slab_mm / (2 * n.radius_mm), 1.0);
@@ -194,7 +201,7 @@ class Beams {
             if (in_.frame.effects.targets) find_target(in_, p);
             const AcousticProperties& acoustics = in_.scene.acoustics[p.acoustics_index];
             const double past = in_.row(k).r_mm - face.dome_mm;
-            const bool dome = past > -1;
+            const bool dome = past > -kDomeClearMm;
             const double line = dome_echo(face, past);
             const WallEcho wall = meet_wall(k, l, acoustics);
             echo_of_tissue(acoustics, wall, line, p);
@@ -212,9 +219,11 @@ class Beams {
             if (dead) p.field_re = p.field_im = {};
             add_clutter(in_, p, t);
             out.clutter[at] = t.clutter;
-            if (dome) p.loss = past < kDomeReachMm ? 0 : 1e9;
+            if (dome && past < kDomeReachMm)
+                p.loss =
+                    past < kMirrorMm && past + g.step_mm >= kMirrorMm ? -kMirrorDb / kDbPerLog2 : 0;
             light_tails(in_, acoustics.kind, face, p, t);
-            meet_needle(in_, o, d, p, t);
+            meet_needle(in_, face, o, d, p, t);
             for (std::size_t i = 0; i < out.looks.size(); ++i) {
                 out.looks[i].re[at] = p.re + p.field_re[i];
                 out.looks[i].im[at] = p.im + p.field_im[i];
@@ -288,7 +297,10 @@ class Beams {
         Sample p{in_.row(k)};
         const Vector3 across = f.volume_from_probe.rotation * Vector3{0, 1, 0};
         const Vector3 sideways = f.volume_from_probe.rotation * Vector3{1, 0, 0};
-        const Point3 x = point_at(l, p.row.r_mm);
+        const PlanePoint d = in_.geometry.beam_direction(l);
+        const Point3 x =
+            point_at(l, p.row.r_mm) + mirrored_mm(face_of(l).dome_mm, p.row.r_mm) *
+                                          (f.volume_from_probe.rotation * Vector3{d.x, 0, d.z});
         p.from_origin = x - s.grid.origin_mm;
 
         const double jitter = in_.draw(in_.noise.white, NoiseUse::elevation, 0, k, l);

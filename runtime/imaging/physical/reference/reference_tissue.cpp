@@ -294,16 +294,16 @@ WallEcho wall_echo(
     const WallTables& sheets = in.tables.wall;
     const auto place = [&](Point3 v) { return wall_place(in.scene.layers, sheets, v); };
     const WallPlace here = place(voxel), before = place(above), after = place(below);
-    const auto sheet = [&](const std::vector<float>& table, double mm, double before_mm,
-                           double after_mm) {
+    const auto sheet = [&](const SheetTable& table, double mm, double before_mm, double after_mm) {
         const double cosine = std::min(std::abs(after_mm - before_mm) / node_mm, 1.0);
-        return static_cast<double>(table[wall_step(mm, table.size())]) * std::pow(cosine, 4);
+        return static_cast<double>(table.echo[wall_step(sheets, table, here.course, mm)]) *
+               std::pow(cosine, 4);
     };
     const double outer = sheet(sheets.outer, here.depth, before.depth, after.depth),
                  inner = sheet(sheets.inner, here.above, before.above, after.above);
     const double share = std::clamp(0.5 + (here.above - here.depth) / kWallBlendMm, 0.0, 1.0);
-    return {(outer * share + inner * (1 - share)) * std::exp2(here.strength_db / kDbPerLog2),
-            here.above > 0, wall_ground_db(sheets, here.depth, here.above)};
+    return {outer * share + inner * (1 - share), here.above > 0,
+            wall_ground_db(sheets, here.depth, here.above)};
 }
 
 }  // namespace sonocase::runtime
