@@ -317,13 +317,18 @@ class App {
         });
     }
 
+    // Recordings have the second of their begin; two attempts of one second, in two tabs, differ by the millisecond.
+    began(ms) {
+        this.started_ms = ms;
+        this.started = new Date(ms).toISOString().replace(/\.\d+Z$/, 'Z');
+    }
     // The targets lie elsewhere in each attempt, drawn from a seed that the recording keeps.
     async start_attempt() {
         const {drawn} = this.description.exercises[this.exercise];
         if (drawn && !await this.whole_case(t('A new place of the target needs the whole case, which is still loading.'))) return;
         const asked = Number(new URLSearchParams(location.search).get('seed'));
         const seed = !drawn ? 0 : asked > 0 ? asked : 1 + crypto.getRandomValues(new Uint32Array(1))[0] % 1e9;
-        this.started = new Date().toISOString().replace(/\.\d+Z$/, 'Z');
+        this.began(Date.now());
         try {
             this.core.start_attempt($('trainee').value.trim(), this.started, performance.now() / 1000, seed);
         } catch (error) {
@@ -357,7 +362,7 @@ class App {
             this.scan.notice(error.message);
             return;
         }
-        this.attempt = {started: this.started, trainee: $('trainee').value.trim(), case_name: this.description.case_name,
+        this.attempt = {started: this.started, started_ms: this.started_ms, trainee: $('trainee').value.trim(), case_name: this.description.case_name,
             exercise: exercise.name, title: exercise.title || exercise.name, passed: finished.score.passed, exam: this.scan.exam(),
             recording: finished.recording, score_text: finished.score_text};
         this.show_after(finished.score);
