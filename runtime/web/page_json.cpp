@@ -3,6 +3,7 @@
 #include "runtime/web/page_json.h"
 
 #include <algorithm>
+#include <climits>
 #include <cmath>
 
 #include "formats/base/clinical_names.h"
@@ -280,10 +281,31 @@ Json json_of_standing(const CourseModule& module, const ModuleStanding& now) {
     return one;
 }
 
+// "attempts" of what a page has kept.
+std::vector<ProgressEntry> history_of(detail::JsonObject& kept) {
+    constexpr std::int64_t kSeeds = std::int64_t{1} << 53;
+    std::vector<ProgressEntry> history;
+    for (detail::JsonObject& one : kept.objects("attempts")) {
+        ProgressEntry entry;
+        entry.case_name = one.text("case");
+        entry.exercise = one.text("exercise");
+        entry.started = one.text("started");
+        entry.passed = one.flag_or("passed", false);
+        entry.exam = one.flag_or("exam", false);
+        entry.seed = static_cast<std::uint64_t>(one.integer_or("seed", 0, 0, kSeeds));
+        if (one.has("values")) {
+            detail::JsonObject values = one.object("values");
+            for (const std::string& name : values.keys())
+                entry.metrics.push_back({name, values.number(name.c_str())});
+        }
+        history.push_back(std::move(entry));
+    }
+    return history;
+}
+
 }  // namespace
 
 Result<std::string> course_standing_json(const Course& course, std::string_view kept) {
-    constexpr std::int64_t kSeeds = std::int64_t{1} << 53;
     detail::JsonFault fault{"the course's progress", {}};
     Json parsed;
     std::vector<ProgressEntry> history;
@@ -292,21 +314,7 @@ Result<std::string> course_standing_json(const Course& course, std::string_view 
     if (detail::parse_json(kept, parsed, fault)) {
         detail::JsonObject root(parsed, "", fault);
         today = root.text("today");
-        for (detail::JsonObject& one : root.objects("attempts")) {
-            ProgressEntry entry;
-            entry.case_name = one.text("case");
-            entry.exercise = one.text("exercise");
-            entry.started = one.text("started");
-            entry.passed = one.flag_or("passed", false);
-            entry.exam = one.flag_or("exam", false);
-            entry.seed = static_cast<std::uint64_t>(one.integer_or("seed", 0, 0, kSeeds));
-            if (one.has("values")) {
-                detail::JsonObject values = one.object("values");
-                for (const std::string& name : values.keys())
-                    entry.metrics.push_back({name, values.number(name.c_str())});
-            }
-            history.push_back(std::move(entry));
-        }
+        history = history_of(root);
         std::vector<detail::JsonObject> given;
         if (root.has("answers")) given = root.objects("answers");
         for (detail::JsonObject& one : given) {
@@ -325,6 +333,28 @@ Result<std::string> course_standing_json(const Course& course, std::string_view 
     for (std::size_t i = 0; i < course.modules.size(); ++i)
         modules.push_back(json_of_standing(course.modules[i], standing.modules[i]));
     out["modules"] = std::move(modules);
+    return detail::json_text(out, false);
+}
+
+Result<std::string> standings_json(std::string_view kept) {
+    detail::JsonFault fault{"the attempts that this browser keeps", {}};
+    Json parsed, out = Json::array();
+    if (detail::parse_json(kept, parsed, fault)) {
+        detail::JsonObject root(parsed, "", fault);
+        const std::vector<ProgressEntry> history = history_of(root);
+        for (detail::JsonObject& one : root.objects("asked")) {
+            const std::string of_case = one.text("case"), exercise = one.text("exercise");
+            const int mastery = static_cast<int>(one.integer("mastery", 1, INT_MAX));
+            const Standing now = standing(history, of_case, exercise, mastery);
+            Json answer = Json::object();
+            answer["attempts"] = now.attempts;
+            answer["passes"] = now.passes;
+            answer["mastered"] = now.mastered;
+            answer["best_mm"] = detail::json_number(now.best_mm < 0 ? NAN : now.best_mm);
+            out.push_back(std::move(answer));
+        }
+    }
+    if (fault.error) return *fault.error;
     return detail::json_text(out, false);
 }
 

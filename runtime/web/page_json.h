@@ -50,4 +50,9 @@ std::string course_json(const Course& course);
 // gate has been reached, 1 once it is passed. Error: what was kept is damaged.
 Result<std::string> course_standing_json(const Course& course, std::string_view kept);
 
+// How a trainee stands with exercises, for the cards of the cases (course_standing.h): {"attempts":
+// as above, "asked": [{"case", "exercise", "mastery"}]}. Returns for each that is asked
+// {"attempts", "passes", "mastered", "best_mm"}; null: no attempt has that measure.
+Result<std::string> standings_json(std::string_view kept);
+
 }  // namespace sonocase::runtime::inline web

@@ -67,7 +67,11 @@ class App {
             this.list = {cases: []};
             this.say(error);
         }
-        const ready = program.then(() => { this.ready = true; }, (error) => this.say(error));
+        const ready = program.then(async (core) => {
+            this.counts = core;
+            if (!$('start').hidden) await this.show_cases();
+            this.ready = true;
+        }).catch((error) => this.say(error));
         const wanted = this.list.cases.find((one) => one.name === asked.get('case'));
         if (!wanted) this.show_cases();
         if (asked.get('case') && !wanted) this.say(new PlainError(t('This site has no case named {}.', asked.get('case'))));
@@ -136,6 +140,7 @@ class App {
         if (this.list.cases.length) await this.read_kept();
         const wanted = $('search').value.trim().toLowerCase();
         const shown = this.list.cases.filter((entry) => [entry.title, entry.name, ...entry.exercises.map(title_of)].some((one) => one.toLowerCase().includes(wanted)));
+        const stands = this.standings(), focused = [...$('cases').querySelectorAll('button')].indexOf(document.activeElement);
         $('search').hidden = this.list.cases.length < 2;
         $('cases').replaceChildren(...shown.map((entry) => {
             const item = element('li');
@@ -145,7 +150,7 @@ class App {
             const words = element('div', '', {className: 'words'});
             words.append(element('h2', entry.title), element('p', t('%s · %.1f MB · exercises: %zu', entry.name, entry.bytes / 1e6, entry.exercises.length), {className: 'second'}));
             item.append(picture, words, ...entry.exercises.map((exercise) => {
-                const button = element('button', '', {type: 'button'}), {good, said} = this.standing(entry, exercise);
+                const button = element('button', '', {type: 'button'}), {good, said} = this.standing_words(stands.get(exercise));
                 button.append(element('span', good === null ? '◎' : good ? '✓' : '✗', {className: `mark ${good === null ? '' : good ? 'pass' : 'fail'}`}),
                     element('span', title_of(exercise)), element('span', said, {className: 'second'}));
                 button.firstChild.setAttribute('aria-hidden', 'true');
@@ -154,6 +159,7 @@ class App {
             }));
             return item;
         }));
+        $('cases').querySelectorAll('button')[focused]?.focus();
         this.show_next();
         if (!this.list.cases.length) $('notice').textContent = t('This site holds no case. Open one from a file.');
     }
@@ -167,19 +173,25 @@ class App {
     attempts_of(case_name, exercise) {
         return (this.kept ?? []).filter((one) => one.case_name === case_name && one.exercise === exercise);
     }
-    // How a trainee stands with an exercise, as the window says it.
-    standing(entry, {name, mastery}) {
-        const attempts = this.attempts_of(entry.case ?? entry.title, name);
-        if (!attempts.length) return {good: null, said: t('Not tried')};
-        let row = 0, mastered = false, passes = 0, best = Infinity;
-        for (const {passed, score_text} of attempts) {
-            row = passed ? row + 1 : 0;
-            passes += passed;
-            mastered ||= row >= (mastery ?? 3);
-            best = Math.min(best, JSON.parse(score_text).metrics?.final_tip_to_target_mm ?? Infinity);
-        }
-        const said = mastered ? t('Mastered') : passes ? t('Passed %d of %d', passes, attempts.length) : t('Not passed in %d', attempts.length);
-        return {good: passes > 0, said: best < Infinity ? `${said} · ${t('best')} ${best.toFixed(1)} mm` : said};
+    // How the trainee stands with each exercise of the site, by the window's rule, which the program has.
+    standings() {
+        const asked = this.list.cases.flatMap((entry) => entry.exercises.map((exercise) => ({entry, exercise})));
+        if (!this.counts) return new Map();
+        const attempts = (this.kept ?? []).map(({case_name, exercise, started, passed, seed, score_text}) => {
+            const mm = JSON.parse(score_text).metrics?.final_tip_to_target_mm;
+            return {case: case_name, exercise, started, passed, seed: seed ?? 0, values: Number.isFinite(mm) ? {final_tip_to_target_mm: mm} : {}};
+        });
+        const standings = this.counts.stand_with({attempts, asked: asked.map(({entry, exercise}) => (
+            {case: entry.case ?? entry.title, exercise: exercise.name, mastery: exercise.mastery}))});
+        return new Map(asked.map(({exercise}, n) => [exercise, standings[n]]));
+    }
+    // Undefined: the program, which knows, is still on its way.
+    standing_words(standing) {
+        if (!standing) return {good: null, said: ''};
+        const {attempts, passes, mastered, best_mm} = standing;
+        if (!attempts) return {good: null, said: t('Not tried')};
+        const said = mastered ? t('Mastered') : passes ? t('Passed %d of %d', passes, attempts) : t('Not passed in %d', attempts);
+        return {good: passes > 0, said: best_mm === null ? said : `${said} · ${t('best')} ${best_mm.toFixed(1)} mm`};
     }
     // Where a trainee goes on: the exercise tried last, the one after it once that was passed; at first the first.
     next_exercise() {
@@ -317,13 +329,19 @@ class App {
         });
     }
 
+    // Recordings have the second of their begin; two attempts of one second, in two tabs, differ by the millisecond.
+    began(ms) {
+        this.started_ms = ms;
+        this.started = new Date(ms).toISOString().replace(/\.\d+Z$/, 'Z');
+    }
     // The targets lie elsewhere in each attempt, drawn from a seed that the recording keeps.
     async start_attempt() {
         const {drawn} = this.description.exercises[this.exercise];
         if (drawn && !await this.whole_case(t('A new place of the target needs the whole case, which is still loading.'))) return;
         const asked = Number(new URLSearchParams(location.search).get('seed'));
         const seed = !drawn ? 0 : asked > 0 ? asked : 1 + crypto.getRandomValues(new Uint32Array(1))[0] % 1e9;
-        this.started = new Date().toISOString().replace(/\.\d+Z$/, 'Z');
+        this.began(Date.now());
+        this.seed = seed;
         try {
             this.core.start_attempt($('trainee').value.trim(), this.started, performance.now() / 1000, seed);
         } catch (error) {
@@ -357,7 +375,7 @@ class App {
             this.scan.notice(error.message);
             return;
         }
-        this.attempt = {started: this.started, trainee: $('trainee').value.trim(), case_name: this.description.case_name,
+        this.attempt = {started: this.started, started_ms: this.started_ms, seed: this.seed, trainee: $('trainee').value.trim(), case_name: this.description.case_name,
             exercise: exercise.name, title: exercise.title || exercise.name, passed: finished.score.passed, exam: this.scan.exam(),
             recording: finished.recording, score_text: finished.score_text};
         this.show_after(finished.score);

@@ -236,6 +236,12 @@ export class Core {
         this.check(this.calls.stand_in_course());
         return JSON.parse(this.text());
     }
+    // How a trainee stands with exercises, as page_json.h has it.
+    stand_with(kept) {
+        this.set_text(JSON.stringify(kept));
+        this.check(this.calls.stand_with());
+        return JSON.parse(this.text());
+    }
     // {recording: bytes of an .igs.mha, score_text: JSON text, score}
     finish_attempt() {
         this.check(this.calls.finish_attempt());

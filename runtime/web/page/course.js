@@ -66,7 +66,6 @@ function course_words(key, ...what) {
 }
 // As plain_identifier() of the packages has it.
 const plain_identifier = (name) => name.replaceAll(/[^0-9A-Za-z]/g, '-') || '-';
-const seconds_of = (started) => Math.floor(Date.parse(started) / 1000);
 
 export class CourseView {
     // app: for what leads away from the course
@@ -139,9 +138,9 @@ export class CourseView {
             const state = this.kept.state(module.name);
             if (state.option >= 0 && state.option < module.options.length) answers.push({module: module.name, option: state.option});
             state.attempts.forEach((one, n) => {
-                const key = `${one.started} ${module.case} ${module.exercise}`;
+                const key = `${one.started_ms} ${module.case} ${module.exercise}`;
                 const entry = attempts.get(key) ?? {case: module.case, exercise: module.exercise, passed: one.passed, exam: one.exam, values: {},
-                    started: new Date(1000 * one.started).toISOString().replace('.000Z', 'Z')};
+                    started: new Date(one.started_ms).toISOString()};
                 if (n === state.attempts.length - 1 && module.measure && state.value !== null) entry.values[module.measure] = state.value;
                 attempts.set(key, entry);
             });
@@ -359,7 +358,7 @@ export class CourseView {
         if (this.alone) {
             for (const module of here) {
                 const state = this.kept.state(module.name);
-                state.attempts.push({started: seconds_of(attempt.started), passed: attempt.passed, exam: attempt.exam});
+                state.attempts.push({started_ms: attempt.started_ms, passed: attempt.passed, exam: attempt.exam});
                 state.value = score.metrics[module.measure] ?? null;
                 state.phase = 'practice';
             }

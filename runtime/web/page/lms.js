@@ -41,19 +41,19 @@ function write_kept(storage, key, text) {
     }
 }
 
-// The state of a module: {phase, option, attempts: [{started: s since 1970, passed, exam}], value: the practised measure
+// The state of a module: {phase, option, attempts: [{started_ms: since 1970, passed, exam}], value: the practised measure
 // in the last attempt, told: the day on which a platform was told of the pass}. As text: attempts as
-// seconds since the one before, in base 36, and a letter: P F passed or failed, X Y the same in an exam.
+// milliseconds since the one before, in base 36, and a letter: P F passed or failed, X Y the same in an exam.
 const kLetters = ['F', 'P', 'Y', 'X'];
 export function new_module_state() { return {phase: 'question', option: -1, attempts: [], value: null, told: ''}; }
 export function module_text(state) {
     for (let from = 0;; ++from) {
         let before = 0, packed = '';
-        for (const {started, passed, exam} of state.attempts.slice(from)) {
-            packed += (started - before).toString(36) + kLetters[(passed ? 1 : 0) + (exam ? 2 : 0)];
-            before = started;
+        for (const {started_ms, passed, exam} of state.attempts.slice(from)) {
+            packed += (started_ms - before).toString(36) + kLetters[(passed ? 1 : 0) + (exam ? 2 : 0)];
+            before = started_ms;
         }
-        const text = JSON.stringify({v: 1, p: state.phase, o: state.option, a: packed, x: state.value, t: state.told});
+        const text = JSON.stringify({v: 2, p: state.phase, o: state.option, a: packed, x: state.value, t: state.told});
         // The oldest attempts go first: the gate looks at the last ones, and `told` keeps the pass.
         if (text.length <= kMostLetters) return text;
     }
@@ -66,17 +66,18 @@ export function module_state(text) {
     } catch {
         return null;
     }
-    if (kept?.v !== 1 || typeof kept.a !== 'string' || !/^([0-9a-z]+[FPYX])*$/.test(kept.a)) return null;
+    const unit_ms = {1: 1000, 2: 1}[kept?.v];
+    if (!unit_ms || typeof kept.a !== 'string' || !/^([0-9a-z]+[FPYX])*$/.test(kept.a)) return null;
     const state = new_module_state();
     if (['question', 'text', 'expert', 'practice'].includes(kept.p)) state.phase = kept.p;
     if (Number.isInteger(kept.o) && kept.o >= 0 && kept.o < 4) state.option = kept.o;
     if (Number.isFinite(kept.x)) state.value = kept.x;
     if (typeof kept.t === 'string') state.told = kept.t;
-    let started = 0;
+    let started_ms = 0;
     for (const [, delta, letter] of kept.a.matchAll(/([0-9a-z]+)([FPYX])/g)) {
-        started += parseInt(delta, 36);
+        started_ms += unit_ms * parseInt(delta, 36);
         const at = kLetters.indexOf(letter);
-        state.attempts.push({started, passed: at % 2 === 1, exam: at > 1});
+        state.attempts.push({started_ms, passed: at % 2 === 1, exam: at > 1});
     }
     return state;
 }
@@ -84,9 +85,9 @@ export function module_state(text) {
 export function merged_states(a, b) {
     if (!a || !b) return a ?? b;
     const kPhases = ['question', 'text', 'expert', 'practice'];
-    const all = new Map([...a.attempts, ...b.attempts].map((one) => [one.started, one]));
-    const attempts = [...all.values()].sort((x, y) => x.started - y.started);
-    const newest = (b.attempts.at(-1)?.started ?? 0) > (a.attempts.at(-1)?.started ?? 0) ? b : a;
+    const all = new Map([...a.attempts, ...b.attempts].map((one) => [one.started_ms, one]));
+    const attempts = [...all.values()].sort((x, y) => x.started_ms - y.started_ms);
+    const newest = (b.attempts.at(-1)?.started_ms ?? 0) > (a.attempts.at(-1)?.started_ms ?? 0) ? b : a;
     return {phase: kPhases[Math.max(kPhases.indexOf(a.phase), kPhases.indexOf(b.phase))], option: a.option >= 0 ? a.option : b.option,
         attempts, value: newest.value, told: a.told || b.told};
 }

@@ -38,7 +38,7 @@ async function store(mode, name = kStore) {
     return open && open.transaction(name, mode).objectStore(name);
 }
 
-// attempt: {started, trainee, case_name, exercise, title, passed, recording, score_text}.
+// attempt: {started, started_ms, trainee, case_name, exercise, title, passed, recording, score_text}.
 // false: nothing was kept.
 export async function keep_attempt(attempt) {
     try {

@@ -459,6 +459,14 @@ SONOCASE_EXPORT(stand_in_course) int stand_in_course() {
     page.text = std::move(*standing);
     return 1;
 }
+// text(): attempts that are kept, and the exercises that are asked about; on success how the
+// trainee stands with each (page_json.h).
+SONOCASE_EXPORT(stand_with) int stand_with() {
+    auto standings = standings_json(page.text);
+    if (!standings) return answer(standings.error());
+    page.text = std::move(*standings);
+    return 1;
+}
 
 // The Doppler modes.
 

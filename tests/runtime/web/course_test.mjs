@@ -83,18 +83,18 @@ const press = (page, id, where = '') => page.value(`${where}document.getElementB
 const answer = (page, n, where = '') => page.value(`${where}document.querySelectorAll('#module .stack button')[${n}].click()`);
 // An attempt that ended with these scores: through the page while it scans, else handed to the course alone, which
 // saves opening the case. A real attempt has page_test.mjs.
-// Each begins a minute after the one before, over reloads too: two of one second would be one attempt.
+// Several begin in one second, each in a millisecond of its own, and all of them count.
 let attempts = 0;
 const attempt = (page, passed, where = '') => page.value(`(async () => {
     const {app} = ${where}sonoplay, score = {passed: ${passed}, pass_marks: [], metrics: {probe_path_length_mm: 300}, warnings: []};
-    app.started = new Date(Date.now() + 60000 * ${++attempts}).toISOString().replace(/\\.\\d+Z$/, 'Z');
+    app.began(Date.now() + ${++attempts});
     if (app.scan.shown()) {
         app.core.finish_attempt = () => ({recording: new Uint8Array(4), score_text: '{}', score});
         app.core.result = () => ({has_marks: true, passed: ${passed}, marks: 0, marks_reached: 0, advice: '', rows: [], measures: []});
         await app.score_attempt();
         return;
     }
-    const made = {started: app.started, trainee: '', case_name: 'cylinder', exercise: 'scan', title: 'Find', passed: ${passed}, exam: false};
+    const made = {started: app.started, started_ms: app.started_ms, trainee: '', case_name: 'cylinder', exercise: 'scan', title: 'Find', passed: ${passed}, exam: false};
     app.course.takes([['completed', made, score], ['scored', made, score]]);
     app.course.attempt_done(made, score);
     app.course.show();

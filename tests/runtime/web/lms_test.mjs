@@ -39,7 +39,7 @@ async function kept_course(kind, browser) {
 // An attempt that ended now; part and passed as the program's gate gives them.
 function attempt(kept, browser, good, part, passed = part >= 1) {
     const state = kept.state('look');
-    state.attempts.push({started: Math.floor(browser.now_ms() / 1000), passed: good, exam: false});
+    state.attempts.push({started_ms: browser.now_ms(), passed: good, exam: false});
     state.phase = 'practice';
     kept.save('look', part, passed, '2026-02-03');
 }
@@ -62,22 +62,23 @@ await run_tests({
     async a_state_comes_back_from_its_text_and_fits_where_little_may_be_kept() {
         const state = new_module_state();
         Object.assign(state, {phase: 'practice', option: 2, value: 0.25, told: '2026-02-03'});
-        for (let n = 0; n < 2000; ++n) state.attempts.push({started: 1.77e9 + 86400 * n, passed: n % 3 > 0, exam: n % 5 === 0});
+        for (let n = 0; n < 2000; ++n) state.attempts.push({started_ms: 1.77e12 + 86400e3 * n, passed: n % 3 > 0, exam: n % 5 === 0});
         const text = module_text(state), back = module_state(text);
         expect(text.length <= 4000 && back.attempts.length > 500, `${text.length} letters, ${back.attempts.length} attempts`);
         expect_equal(JSON.stringify(back.attempts.at(-1)), JSON.stringify(state.attempts.at(-1)), 'the newest stays');
-        expect_equal(back.attempts.at(0).started, state.attempts.at(-back.attempts.length).started, 'the first that is left has its time');
+        expect_equal(back.attempts.at(0).started_ms, state.attempts.at(-back.attempts.length).started_ms, 'the first that is left has its time');
         expect_equal(`${back.phase} ${back.option} ${back.value} ${back.told}`, 'practice 2 0.25 2026-02-03', 'the rest');
-        for (const damaged of ['', 'null', '{}', '{"v":1}', '{"v":2,"a":""}', '{"v":1,"a":"1Q"}', '{"v":1,"a":5}', text.slice(0, 50)])
+        for (const damaged of ['', 'null', '{}', '{"v":1}', '{"v":3,"a":""}', '{"v":2,"a":"1Q"}', '{"v":2,"a":5}', text.slice(0, 50)])
             expect_equal(module_state(damaged), null, damaged);
-        const odd = module_state('{"v":1,"p":"moon","o":77,"a":"aP","x":"1","t":5}');
-        expect_equal(JSON.stringify(odd), JSON.stringify({...new_module_state(), attempts: [{started: 10, passed: true, exam: false}]}), 'what makes no sense is left out');
+        const odd = module_state('{"v":2,"p":"moon","o":77,"a":"aP","x":"1","t":5}');
+        expect_equal(JSON.stringify(odd), JSON.stringify({...new_module_state(), attempts: [{started_ms: 10, passed: true, exam: false}]}), 'what makes no sense is left out');
+        expect_equal(module_state('{"v":1,"p":"text","o":0,"a":"aPzX","x":4,"t":""}').attempts.map((one) => one.started_ms).join(), '10000,45000', 'an older text, in seconds');
     },
     async two_copies_lose_nothing_of_either() {
-        const one = module_state('{"v":1,"p":"practice","o":1,"a":"aPaF","x":3,"t":""}'), other = module_state('{"v":1,"p":"text","o":0,"a":"aPzX","x":4,"t":"2026-02-03"}');
+        const one = module_state('{"v":2,"p":"practice","o":1,"a":"aPaF","x":3,"t":""}'), other = module_state('{"v":2,"p":"text","o":0,"a":"aPzX","x":4,"t":"2026-02-03"}');
         for (const [a, b] of [[one, other], [other, one]]) {
             const both = merged_states(a, b);
-            expect_equal(both.attempts.map(({started}) => started).join(), '10,20,45', 'attempts');
+            expect_equal(both.attempts.map((attempt) => attempt.started_ms).join(), '10,20,45', 'attempts, also of one second');
             expect_equal(`${both.phase} ${both.value} ${both.told}`, 'practice 4 2026-02-03', 'the rest');
         }
         expect_equal(merged_states(null, one), one, 'one alone');

@@ -387,5 +387,33 @@ gate = { passes_in_a_row = 1, exam = true }
         EXPECT_FALSE(course_standing_json(*course, damaged)) << damaged;
 }
 
+// The cards of the cases: the same rule for each exercise, easier attempts left out of mastery.
+TEST(PageStandings, are_those_of_the_windows_rule) {
+    const std::uint64_t written = 7, easy = seed_with_difficulty(7, -1);
+    const auto attempt = [](const char* exercise, bool passed, std::uint64_t seed, double mm) {
+        return R"({"case":"cylinder","exercise":")" + std::string(exercise) +
+               R"(","started":"2026-02-01T10:00:00.250Z","seed":)" + std::to_string(seed) +
+               R"(,"values":{"final_tip_to_target_mm":)" + std::to_string(mm) + R"(},"passed":)" +
+               (passed ? "true}" : "false}");
+    };
+    const auto stands = [](const std::string& attempts) {
+        return standings_json(R"({"attempts":[)" + attempts +
+                              R"(],"asked":[{"case":"cylinder","exercise":"scan","mastery":2},)"
+                              R"({"case":"cylinder","exercise":"needle","mastery":2}]})");
+    };
+    constexpr const char* kNone = R"({"attempts":0,"passes":0,"mastered":false,"best_mm":null})";
+    EXPECT_EQ(*stands(""), "[" + std::string(kNone) + "," + kNone + "]");
+    EXPECT_EQ(
+        *stands(attempt("scan", true, written, 4) + "," + attempt("scan", true, easy, 2.5)),
+        R"([{"attempts":2,"passes":2,"mastered":false,"best_mm":2.5},)" + std::string(kNone) + "]");
+    EXPECT_EQ(
+        *stands(attempt("needle", true, 0, 4) + "," + attempt("needle", false, 0, 9) + "," +
+                attempt("needle", true, written, 3) + "," + attempt("needle", true, 0, 5)),
+        "[" + std::string(kNone) + R"(,{"attempts":4,"passes":3,"mastered":true,"best_mm":3.0}])");
+    for (const char* damaged : {"", "{}", R"({"attempts":[]})", R"({"attempts":[{}],"asked":[]})",
+                                R"({"attempts":[],"asked":[{"case":"a","exercise":"b"}]})"})
+        EXPECT_FALSE(standings_json(damaged)) << damaged;
+}
+
 }  // namespace
 }  // namespace sonocase::runtime

@@ -94,6 +94,10 @@ await run_tests({
         // Kept for the next visit.
         await page.until('sonoplay.app.settled === sonoplay.app.started');
         await page.click('after-cases');
+        // The case's card says how the trainee stands.
+        const {passed, metrics} = JSON.parse(text);
+        const best = metrics.final_tip_to_target_mm === null ? '' : ` · best ${metrics.final_tip_to_target_mm.toFixed(1)} mm`;
+        await page.until(`document.querySelector("#cases button").textContent.endsWith(${JSON.stringify((passed ? 'Passed 1 of 1' : 'Not passed in 1') + best)})`, 20);
         await page.click('open-scores');
         await page.until('document.querySelectorAll("#attempts tr").length === 1');
         await page.close();

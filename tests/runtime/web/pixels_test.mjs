@@ -15,8 +15,16 @@ const case_file = given_case ?? join(work, 'small.sonocase'), session_file = giv
 if (!given_case) run(join(bin, 'core_write_case'), case_file, session_file, 'flow');
 const case_bytes = readFileSync(case_file);
 
+// Once for all tests: each program is compiled, and the desktop draws, for several of them.
+const once = (make, made = new Map()) => (...key) => {
+    if (!made.has(key.join())) made.set(key.join(), make(...key));
+    return made.get(key.join());
+};
+const compiled = once((name) => WebAssembly.compile(readFileSync(join(program, name))));
+const drawn = once((what, mode, side) => JSON.parse(run(oracle, what, case_file, session_file, mode, String(side))));
+
 async function open(name) {
-    const core = await Core.create(await WebAssembly.compile(readFileSync(join(program, name))));
+    const core = await Core.create(await compiled(name));
     core.reserve(case_bytes.length);
     core.put(case_bytes, 0);
     core.open(case_file);
@@ -30,7 +38,7 @@ function digest(core, pixels) {  // by the program's own XXH3, of bytes put into
 
 async function same_pixels(name, model) {
     const side = 512;
-    const wanted = JSON.parse(run(oracle, 'frames', case_file, session_file, model, String(side)));
+    const wanted = drawn('frames', model, side);
     const core = await open(name);
     core.choose_exercise(0, side);
     core.set_image({model_paper: model === 'paper', side, depth_mm: 0, focus_mm: 0});
@@ -55,7 +63,7 @@ async function same_pixels(name, model) {
 async function same_doppler(name) {
     const side = 256;
     for (const mode of ['colour', 'power', 'spectral', 'm_mode']) {
-        const wanted = JSON.parse(run(oracle, 'doppler', case_file, session_file, mode, String(side)));
+        const wanted = drawn('doppler', mode, side);
         const core = await open(name), made = new Set();
         core.choose_exercise(0, side);
         core.set_image({model_paper: false, side, depth_mm: 0, focus_mm: 0});
