@@ -142,7 +142,7 @@ void CameraTracker::stream(PictureSource& source) {
         ++health_.connects;
     }
     PictureFollower follower(std::move(*detector),
-                             MarkerFollower(*camera, marker_bodies(options_.setup.markers)));
+                             MarkerFollower(*camera, marker_bodies(options_.setup)));
     EmptyPictures empty;
     GreyImage picture;
     double last_s = -1, period_s = 0;
@@ -226,7 +226,7 @@ Result<Recording> load_camera_video(const std::string& path, const CameraTracker
                              model_for(options, picture.width_px, picture.height_px));
                 SONOCASE_TRY(TagDetector detector, TagDetector::create());
                 follower.emplace(std::move(detector),
-                                 MarkerFollower(camera, marker_bodies(options.setup.markers)));
+                                 MarkerFollower(camera, marker_bodies(options.setup)));
             }
             const CameraModel& camera = follower->follower().camera();
             if (picture.width_px != camera.width_px || picture.height_px != camera.height_px)
