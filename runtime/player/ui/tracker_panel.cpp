@@ -129,6 +129,7 @@ void draw_health(const TrackerHealth& health) {
     const bool failed = health.phase == TrackerPhase::failed;
     if (health.phase == TrackerPhase::streaming) {
         if (health.rate_hz > 0) row("Rate", "%.0f Hz", health.rate_hz);
+        if (health.late_s >= 0) row("Predicted over", "%.0f ms", 1e3 * health.late_s);
     } else {
         row("State", tr(phase_name(health.phase)), failed ? colour::kBad : colour::kWarn);
     }

@@ -3,9 +3,9 @@
 // One camera and printed markers as a tracker: sensor 0 is the probe's body, sensor 1 the needle's;
 // world is the board (formats/markers/marker_set.h).
 //
-// A live camera is read by a thread of its own, which hands readings over. A reading bears the time
-// of its picture's exposure, so that its age is known; it is not predicted beyond that. A pose
-// whose spread is too wide to be trusted is `poor`, one tag alone always.
+// A live camera is read by a thread of its own, which hands readings over. Their poses are predicted
+// over the time from the picture's exposure to the reading, which health() tells
+// (formats/markers/pose_predictor.h). A pose whose spread is too wide to be trusted is `poor`, one tag alone always.
 #pragma once
 
 #include <atomic>

@@ -19,6 +19,7 @@
 
 #include "formats/base/constants.h"
 #include "formats/markers/detect/tag_detector.h"
+#include "formats/markers/pose_predictor.h"
 #include "support/marker_jpeg.h"
 #include "support/marker_video.h"
 
@@ -202,8 +203,11 @@ TEST_F(MarkerPose, WhatIsCalledGoodIsRightWhileTheBoardIsTheWorld) {
         return table * p;
     };
     PictureFollower follower(std::move(*detector_), MarkerFollower(camera_, bodies_));
-    int good = 0, lost = 0;
+    PosePredictor predictor(bodies_[0].body_from_tool * Point3{});
+    constexpr double kLateS = 0.045;
+    int good = 0, lost = 0, predicted = 0, since_lost = 0;
     double square_mm = 0, worst_mm = 0, worst_deg = 0;
+    double late_mm = 0, predicted_mm = 0, predicted_worst_deg = 0;
     constexpr double kFrameS = 1 / 30.0;
     constexpr int kFrames = 40;
     for (int i = 0; i < kFrames; ++i) {
@@ -224,10 +228,23 @@ TEST_F(MarkerPose, WhatIsCalledGoodIsRightWhileTheBoardIsTheWorld) {
         }
         lost += reading.status == MarkerStatus::lost;
         EXPECT_EQ(seen.tools[1].status, MarkerStatus::lost);
+        const Rigid now = predictor.follow(reading, t, t + kLateS);
+        since_lost = reading.status == MarkerStatus::lost ? 0 : since_lost + 1;
         if (reading.status != MarkerStatus::good) continue;
         ++good;
         const Point3 tool = bodies_[0].body_from_tool * Point3{};
         const Rigid truth = inverse(board) * probe(t);
+        // Where it is when the pose has come.
+        const Rigid then = inverse(board) * probe(t + kLateS);
+        constexpr int kStarted = 5;  // pictures
+        if (since_lost > kStarted) {
+            const double late = distance(reading.world_from_body * tool, then * tool);
+            const double left = distance(now * tool, then * tool);
+            late_mm += late * late, predicted_mm += left * left, ++predicted;
+            predicted_worst_deg =
+                std::max(predicted_worst_deg,
+                         kDegPerRad * rotation_angle(transpose(then.rotation) * now.rotation));
+        }
         const double off = distance(reading.world_from_body * tool, truth * tool);
         const double deg = kDegPerRad * rotation_angle(transpose(truth.rotation) *
                                                        reading.world_from_body.rotation);
@@ -239,6 +256,10 @@ TEST_F(MarkerPose, WhatIsCalledGoodIsRightWhileTheBoardIsTheWorld) {
     EXPECT_LE(std::sqrt(square_mm / good), 1.5);
     EXPECT_LE(worst_mm, 5);
     EXPECT_LE(worst_deg, 2);
+    ASSERT_GE(predicted, 10);
+    EXPECT_LE(std::sqrt(predicted_mm / predicted), 1.5);
+    EXPECT_LE(predicted_worst_deg, 1);
+    EXPECT_LE(predicted_mm, 0.2 * late_mm);
 }
 
 TEST_F(MarkerPose, OneTagAloneIsNeverCalledGood) {
