@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -275,6 +276,45 @@ TEST_F(MarkerPose, OneTagAloneIsNeverCalledGood) {
         const TagFindings found = look({still_body(one, pose)}, i / 30.0);
         EXPECT_NE(follower.follow(found.tags, found.twice, 0, i / 30.0).tools[0].status,
                   MarkerStatus::good);
+    }
+}
+
+TEST_F(MarkerPose, ACameraThatHangsUpsideDownSeesTheSame) {
+    const Rigid table = camera_from_table(600, 60 * kRadPerDeg);
+    const Rigid board{table.rotation, table * Point3{0, 110, 0} - Point3{}};
+    const Rigid probe{table.rotation, table * Point3{0, -60, 110} - Point3{}};
+    // A lens without distortion: turned about, it is the same lens.
+    const CameraModel plain = assumed_camera(1280, 720);
+    MarkerVideo video(plain);
+    std::vector<std::uint8_t> grey =
+        video.take({still_body(bodies_[2], board), still_body(bodies_[0], probe)}, 0);
+    std::reverse(grey.begin(), grey.end());
+    PictureFollower follower(std::move(*detector_), MarkerFollower(plain, bodies_));
+    const MarkerReading reading = follower.follow({grey.data(), 1280, 720, 1280}, 0).tools[0];
+    ASSERT_EQ(reading.status, MarkerStatus::good);
+    const Point3 tool = bodies_[0].body_from_tool * Point3{};
+    EXPECT_LT(distance(reading.world_from_body * tool, inverse(board) * probe * tool), 1.5);
+}
+
+TEST_F(MarkerPose, APictureOfTheSheetOnAScreenIsNoTool) {
+    // All tags of the probe's body, flat side by side, as the unfolded sheet has them.
+    MarkerBody flat = bodies_[0];
+    for (std::size_t t = 0; t < flat.tags.size(); ++t) {
+        const double x = (static_cast<double>(t % 4) - 1.5) * 34, y = t < 4 ? 17 : -17;
+        flat.tags[t].body_from_tag = {{}, {x, y, 0}};
+        flat.faces[t].corners = {
+            {x - 17, y - 17, 0}, {x + 17, y - 17, 0}, {x + 17, y + 17, 0}, {x - 17, y + 17, 0}};
+        flat.faces[t].tag = static_cast<int>(t);
+    }
+    const Rigid table = camera_from_table(600, 60 * kRadPerDeg);
+    const Rigid board{table.rotation, table * Point3{-110, 60, 0} - Point3{}};
+    PictureFollower follower(std::move(*detector_), MarkerFollower(camera_, bodies_));
+    for (int i = 0; i < 2; ++i) {
+        const Rigid screen{table.rotation * rotation_about({1, 0, 0}, 0.4 * i),
+                           table * Point3{90, -20, 40} - Point3{}};
+        const FollowerPicture seen = follower.follow(
+            picture_of({still_body(bodies_[2], board), still_body(flat, screen)}, i), i / 30.0);
+        EXPECT_NE(seen.tools[0].status, MarkerStatus::good) << i;
     }
 }
 
