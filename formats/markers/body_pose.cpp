@@ -278,11 +278,15 @@ double worst_sigma_mm(const BodyPose& pose, Point3 point_body) {
     return std::sqrt(std::max(0.0, largest_eigenvalue(point_covariance(pose, point_body))));
 }
 
-double worst_sigma_rad(const BodyPose& pose) {
+std::array<double, 9> turn_covariance(const BodyPose& pose) {
     std::array<double, 9> turn{};
     for (int r = 0; r < 3; ++r)
         for (int c = 0; c < 3; ++c) turn[3 * r + c] = pose.covariance[6 * r + c];
-    return std::sqrt(std::max(0.0, largest_eigenvalue(turn)));
+    return turn;
+}
+
+double worst_sigma_rad(const BodyPose& pose) {
+    return std::sqrt(std::max(0.0, largest_eigenvalue(turn_covariance(pose))));
 }
 
 }  // namespace sonocase

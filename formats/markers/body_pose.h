@@ -58,6 +58,8 @@ std::optional<BodyPose> find_body_pose(const CameraModel& camera,
 double worst_sigma_mm(const BodyPose& pose, Point3 point_body);
 // 3 x 3, row by row, of the place of a point of the body.
 std::array<double, 9> point_covariance(const BodyPose& pose, Point3 point_body);
+// The same of a turn about the camera's axes.
+std::array<double, 9> turn_covariance(const BodyPose& pose);
 double worst_sigma_rad(const BodyPose& pose);
 
 }  // namespace sonocase

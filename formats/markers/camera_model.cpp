@@ -99,6 +99,12 @@ Vector3 direction_at(const CameraModel& c, Pixel pixel) {
     return {x, y, 1};
 }
 
+std::vector<MarkerBody> marker_bodies(const CameraSetup& setup) {
+    std::vector<MarkerBody> bodies = marker_bodies(setup.markers);
+    place_tags_as_built(bodies, setup.built);
+    return bodies;
+}
+
 std::string format_camera(const CameraSetup& setup) {
     const CameraModel& c = setup.camera;
     const MarkerSizes& m = setup.markers;
@@ -120,6 +126,10 @@ std::string format_camera(const CameraSetup& setup) {
                       {"needle_reach_mm", m.needle_reach_mm},
                       {"board_tag_mm", m.board_tag_mm},
                       {"ruler_mm", m.ruler_mm}};
+    for (const BuiltTag& tag : setup.built)
+        out["built"].push_back({{"id", tag.id},
+                                {"moved_mm", detail::json_of(tag.moved_mm)},
+                                {"turned_rad", detail::json_of(tag.turned_rad)}});
     return detail::json_text(out, true) + "\n";
 }
 
@@ -149,6 +159,21 @@ Result<CameraSetup> parse_camera(std::string_view json, const std::string& where
         m.needle_reach_mm = markers.number_or("needle_reach_mm", m.needle_reach_mm);
         m.board_tag_mm = markers.number_or("board_tag_mm", m.board_tag_mm);
         m.ruler_mm = markers.number_or("ruler_mm", m.ruler_mm);
+    }
+    if (object.has("built")) {
+        for (JsonObject& entry : object.objects("built")) {
+            BuiltTag tag;
+            tag.id = static_cast<int>(entry.integer("id", 0, kMarkerTagIds - 1));
+            tag.moved_mm = entry.vector("moved_mm");
+            tag.turned_rad = entry.vector("turned_rad");
+            if (norm(tag.moved_mm) > kMaxTagMoved_mm)
+                entry.add_fault("moved_mm", "is farther than a tag can be glued from its place");
+            if (norm(tag.turned_rad) > kMaxTagTurned_rad)
+                entry.add_fault("turned_rad", "is more than a tag can be glued askew");
+            for (const BuiltTag& other : setup.built)
+                if (other.id == tag.id) entry.add_fault("id", "is there twice");
+            setup.built.push_back(tag);
+        }
     }
     if (fault.error) return *fault.error;
     SONOCASE_TRY_DONE(check_marker_sizes(setup.markers));

@@ -2,7 +2,7 @@
 
 // How a camera maps space to pixels: focal lengths, middle, and the distortion of Brown (1966) with
 // three radial and two tangential terms, in the form and order that OpenCV has; and the file (JSON)
-// that keeps it, together with the sizes of the markers that are printed for it.
+// that keeps it, together with the markers that it follows: their sizes and how they were built.
 //
 // Camera frame: x right, y down, z forward, mm. Pixels: the middle of the first one is (0, 0), x
 // right, y down.
@@ -12,6 +12,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "formats/base/geometry.h"
 #include "formats/base/result.h"
@@ -53,8 +54,10 @@ Vector3 direction_at(const CameraModel& camera, Pixel pixel);
 struct CameraSetup {
     CameraModel camera;
     MarkerSizes markers;
+    std::vector<BuiltTag> built;  // tags that were measured where they are; the others as drawn
     bool operator==(const CameraSetup&) const = default;
 };
+std::vector<MarkerBody> marker_bodies(const CameraSetup& setup);
 
 Result<CameraSetup> parse_camera(std::string_view json, const std::string& where);
 std::string format_camera(const CameraSetup& setup);

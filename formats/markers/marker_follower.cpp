@@ -40,6 +40,13 @@ void settle_board(std::optional<BodyPose>& kept, const BodyPose& seen) {
         before.translation + kBoardGain * (seen.camera_from_body.translation - before.translation);
 }
 
+// The same covariance in a frame that is turned.
+std::array<double, 9> turned(const std::array<double, 9>& covariance, const Matrix3& turn) {
+    Matrix3 c;
+    c.m = covariance;
+    return (turn * c * transpose(turn)).m;
+}
+
 }  // namespace
 
 MarkerFollower::MarkerFollower(const CameraModel& camera,
@@ -149,6 +156,10 @@ FollowerPicture MarkerFollower::follow(std::span<const SeenTag> seen,
         reading.sigma_mm = sigma_mm;
         reading.sigma_rad = sigma_rad;
         reading.world_from_body = world_from_body;
+        const Matrix3 world_from_camera =
+            world_from_body.rotation * transpose(camera_from_body.rotation);
+        reading.point_covariance = turned(point_covariance(*pose, tool_body), world_from_camera);
+        reading.turn_covariance = turned(turn_covariance(*pose), world_from_camera);
         const double age_s = recent ? time_s - track.time_s : 0;
         track = {true, time_s, camera_from_body, world_from_body, track.camera_from_body, age_s};
     }

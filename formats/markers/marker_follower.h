@@ -30,6 +30,9 @@ struct MarkerReading {
     // One standard deviation along the worst direction, of the tool's own point (face or tip),
     // board included, and of the angle; negative: no pose.
     double sigma_mm = -1, sigma_rad = -1;
+    // 3 x 3, in the world, of the tool's own point (mm2) and of its turn (rad2), without the
+    // board's part, which is the same in successive pictures.
+    std::array<double, 9> point_covariance{}, turn_covariance{};
     int tags = 0;
     bool two_poses = false;  // a second pose fits nearly as well
 };

@@ -159,6 +159,24 @@ std::vector<MarkerBody> marker_bodies(const MarkerSizes& sizes) {
     return bodies;
 }
 
+void place_tags_as_built(std::vector<MarkerBody>& bodies, std::span<const BuiltTag> tags) {
+    for (const BuiltTag& built : tags) {
+        const TagPlace place = find_tag(bodies, built.id);
+        if (place.body < 0) continue;
+        MarkerBody& body = bodies[place.body];
+        Rigid& body_from_tag = body.tags[place.tag].body_from_tag;
+        const double angle = norm(built.turned_rad);
+        Rigid drawn_from_built{{}, built.moved_mm};
+        if (angle > 0) drawn_from_built.rotation = rotation_about(built.turned_rad / angle, angle);
+        const Rigid drawn = body_from_tag;
+        body_from_tag = drawn * drawn_from_built;
+        for (MarkerFace& face : body.faces) {
+            if (face.tag != place.tag) continue;
+            for (Point3& corner : face.corners) corner = body_from_tag * (inverse(drawn) * corner);
+        }
+    }
+}
+
 TagPlace find_tag(const std::vector<MarkerBody>& bodies, int id) {
     for (std::size_t b = 0; b < bodies.size(); ++b)
         for (std::size_t t = 0; t < bodies[b].tags.size(); ++t)

@@ -16,6 +16,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -89,6 +90,17 @@ double board_pitch_mm(const MarkerSizes& sizes);  // from tag to tag
 // order. Sizes have passed check_marker_sizes(); tags and faces are those of the paper as printed,
 // the reach of a tool is not scaled by the ruler.
 std::vector<MarkerBody> marker_bodies(const MarkerSizes& sizes = {});
+
+// A tag where it was found to be glued, in the frame of the tag as it is drawn.
+struct BuiltTag {
+    int id = 0;
+    Vector3 moved_mm;
+    Vector3 turned_rad;  // rotation vector about the tag's middle
+    bool operator==(const BuiltTag&) const = default;
+};
+inline constexpr double kMaxTagMoved_mm = 10, kMaxTagTurned_rad = 15 * kRadPerDeg;
+// Moves tags of `bodies`, each with its face. Ids that no body has are left out.
+void place_tags_as_built(std::vector<MarkerBody>& bodies, std::span<const BuiltTag> tags);
 
 // Which body an id belongs to, and which of its tags it is; body -1: none.
 struct TagPlace {

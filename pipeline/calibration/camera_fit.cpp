@@ -10,11 +10,11 @@
 #include <ceres/rotation.h>
 
 #include "formats/base/constants.h"
+#include "pipeline/calibration/lens.h"
 
 namespace sonocase::pipeline::inline calibration {
 namespace {
 
-constexpr int kIntrinsics = 9;  // fx, fy, cx, cy, k1, k2, p1, p2, k3
 constexpr double kHuberPx = 0.5;
 
 struct CornerCost {
@@ -26,12 +26,9 @@ struct CornerCost {
         T p[3];
         ceres::AngleAxisRotatePoint(pose, at, p);
         for (int k = 0; k < 3; ++k) p[k] += pose[3 + k];
-        const T x = p[0] / p[2], y = p[1] / p[2], r2 = x * x + y * y;
-        const T radial = 1.0 + r2 * (camera[4] + r2 * (camera[5] + r2 * camera[8]));
-        const T u = x * radial + 2.0 * camera[6] * x * y + camera[7] * (r2 + 2.0 * x * x);
-        const T v = y * radial + camera[6] * (r2 + 2.0 * y * y) + 2.0 * camera[7] * x * y;
-        residual[0] = camera[0] * u + camera[2] - seen.x;
-        residual[1] = camera[1] * v + camera[3] - seen.y;
+        lens_pixel(camera, p, residual);
+        residual[0] -= seen.x;
+        residual[1] -= seen.y;
         return true;
     }
 };
@@ -44,7 +41,7 @@ CameraModel model_of(const std::array<double, kIntrinsics>& c, const CameraModel
 }
 
 struct View {
-    const BoardView* seen = nullptr;
+    const MarkerView* seen = nullptr;
     std::array<double, 6> pose{};
     double square = 0;
     int corners = 0;
@@ -82,7 +79,7 @@ double place_boards(const CameraModel& camera, const MarkerBody& board, std::vec
 
 }  // namespace
 
-CameraFit fit_camera(const std::vector<BoardView>& seen,
+CameraFit fit_camera(const std::vector<MarkerView>& seen,
                      const MarkerBody& board,
                      int width_px,
                      int height_px,

@@ -12,7 +12,7 @@
 
 namespace sonocase::pipeline::inline calibration {
 
-struct BoardView {
+struct MarkerView {
     int picture = 0;  // of the video
     std::vector<SeenTag> tags;
 };
@@ -41,7 +41,7 @@ struct CameraFit {
 
 // views: pictures of one size, each with three tags of the board at least. Deterministic.
 // Cost: about a second for 40 views.
-CameraFit fit_camera(const std::vector<BoardView>& views,
+CameraFit fit_camera(const std::vector<MarkerView>& views,
                      const MarkerBody& board,
                      int width_px,
                      int height_px,

@@ -436,17 +436,19 @@ Suite press_suite(const std::string& data) {
 
 namespace {
 
-// Measured by the program doppler_trial.
-Result<Measured> measure(const std::string& arguments) {
-    SONOCASE_TRY(const auto text,
-                 output_of_program_beside("doppler_trial", arguments,
-                                          "leave --suite colour and spectrum out"));
+// Measured by a program that prints error and seconds: doppler_trial, camera_trial.
+Result<Measured> trial(const std::string& program, const std::string& arguments, const char* cure) {
+    SONOCASE_TRY(const auto text, output_of_program_beside(program, arguments, cure));
     const auto json = nlohmann::json::parse(text, nullptr, false);
     if (json.is_discarded() || !json.contains("error") || !json.contains("seconds"))
-        return Error{"is not the error of a trial", "doppler_trial " + arguments,
+        return Error{"is not the error of a trial", program + " " + arguments,
                      "a JSON object with error and seconds"};
     return Measured{json["error"].get<double>(), json["seconds"].get<double>(),
                     json.value("note", "")};
+}
+
+Result<Measured> measure(const std::string& arguments) {
+    return trial("doppler_trial", arguments, "leave --suite colour and spectrum out");
 }
 
 std::string value_of(const Settings& settings, const std::string& key, const char* standard) {
@@ -510,6 +512,52 @@ Suite spectrum_suite() {
                     "what is left beyond 16 is the bins' and the envelope's"}};
     suite.measure = [](const Settings& settings) {
         return measure("spectrum " + value_of(settings, "spectrum.gate_points", "64"));
+    };
+    return suite;
+}
+
+Suite camera_suite() {
+    Suite suite;
+    suite.name = "camera";
+    suite.title = "One camera and printed markers";
+    suite.body = "rendered-pictures";
+    suite.error_name = "rms error of the probe's face";
+    suite.error_unit = "mm";
+    suite.truth =
+        "Sixty rendered pictures of 65 degrees across, a body of 40 mm held at random 0.6 m away, "
+        "its face 120 mm from it; poses of which a second one fits nearly as well do not count, "
+        "the notes say how many are sure. Seconds are those of one body in one picture, detection "
+        "round it included, on one core.";
+    suite.knobs = {{"camera.width_px",
+                    {"640", "960", "1280", "1920"},
+                    "1280",
+                    "",
+                    "width of the pictures",
+                    "how closely corners are found",
+                    "at 1920 every second pixel is searched, as in the player",
+                    "JPEG and the search for a tool that is out of view cost by the pixel, and few "
+                    "cameras give thirty pictures of 1920 a second"},
+                   {"camera.fit_pixels",
+                    {"0", "150", "300", "600", "1200"},
+                    "600",
+                    "",
+                    "pixels of a tag that its pattern is laid over; 0: lines along its edges",
+                    "noise of the corners",
+                    "tags at 0.6 m have little more than 600 pixels"},
+                   {"camera.tags",
+                    {"1", "2", "3", "4", "8"},
+                    "8",
+                    "",
+                    "tags of the body that are used",
+                    "how the tool's turn is determined",
+                    "hardly more than four are in view",
+                    "the pictures in which fewer tags leave two poses do not count here"}};
+    suite.measure = [](const Settings& settings) {
+        return trial("camera_trial",
+                     value_of(settings, "camera.width_px", "1280") + " " +
+                         value_of(settings, "camera.fit_pixels", "600") + " " +
+                         value_of(settings, "camera.tags", "8"),
+                     "leave --suite camera out");
     };
     return suite;
 }

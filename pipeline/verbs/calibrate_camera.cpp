@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// sonocase calibrate camera: a camera's lens, from a video in which the printed board is turned.
+// sonocase calibrate camera and body: a camera's lens, from a video in which the printed board is
+// turned; and where a body's tags were glued, from one in which the body is.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <ctime>
 
@@ -10,28 +12,31 @@
 #include "formats/markers/camera_model.h"
 #include "formats/markers/detect/grey_jpeg.h"
 #include "formats/markers/detect/tag_detector.h"
-#include "pipeline/calibration/camera_fit.h"
+#include "pipeline/calibration/body_fit.h"
 #include "pipeline/verbs/verb_calibrate.h"
 
 namespace sonocase::pipeline::inline verbs {
 namespace {
 
-struct BoardVideo {
-    std::vector<BoardView> views;
+struct MarkerFilm {
+    std::vector<MarkerView> views;
     int width_px = 0, height_px = 0, pictures = 0, damaged = 0;
 };
 
-// The pictures in which the board is seen, evenly thinned out.
-Result<BoardVideo> look_at_board(const std::string& path, const MarkerBody& board, int max_views) {
+// The pictures in which min_tags of a body or board are seen, evenly thinned out.
+Result<MarkerFilm> look_at(const std::string& path,
+                           const MarkerBody& body,
+                           std::size_t min_tags,
+                           int max_views) {
     SONOCASE_TRY(const JpegVideo video, load_jpeg_video(path));
     SONOCASE_TRY(GreyJpegReader reader, GreyJpegReader::create());
     SONOCASE_TRY(TagDetector detector, TagDetector::create());
-    BoardVideo out;
+    MarkerFilm out;
     out.pictures = static_cast<int>(video.pictures.size());
     GreyImage picture;
     // Successive pictures of a video say much the same.
     const std::size_t every = std::max<std::size_t>(1, video.pictures.size() / (4 * max_views));
-    std::vector<BoardView> views;
+    std::vector<MarkerView> views;
     for (std::size_t i = 0; i < video.pictures.size(); i += every) {
         if (!reader.read(video.pictures[i], picture)) {
             ++out.damaged;
@@ -42,12 +47,12 @@ Result<BoardVideo> look_at_board(const std::string& path, const MarkerBody& boar
             return Error{"the size of the pictures changes", path, "use pictures of one size"};
         TagFindings found = detector.find(
             {picture.pixels.data(), picture.width_px, picture.height_px, picture.width_px});
-        BoardView view;
+        MarkerView view;
         view.picture = static_cast<int>(i);
         for (SeenTag& tag : found.tags)
-            for (const MarkerTag& drawn : board.tags)
+            for (const MarkerTag& drawn : body.tags)
                 if (drawn.id == tag.id) view.tags.push_back(tag);
-        if (view.tags.size() >= 3) views.push_back(std::move(view));
+        if (view.tags.size() >= min_tags) views.push_back(std::move(view));
     }
     const std::size_t thin = (views.size() + max_views - 1) / max_views;
     for (std::size_t k = 0; k < views.size(); k += std::max<std::size_t>(1, thin))
@@ -105,7 +110,7 @@ int calibrate_camera(int argc, char** argv) {
     const Stopwatch watch;
     if (auto s = check_marker_sizes(setup.markers); !s) return fail("calibrate", s.error());
     const MarkerBody board = marker_bodies(setup.markers).back();
-    const auto seen = look_at_board(video, board, max_views);
+    const auto seen = look_at(video, board, 3, max_views);
     if (!seen) return fail("calibrate", seen.error());
     const CameraFit fit = fit_camera(seen->views, board, seen->width_px, seen->height_px);
     const CameraModel& c = fit.camera;
@@ -156,6 +161,109 @@ int calibrate_camera(int argc, char** argv) {
         setup.camera.date = when.today();
         if (auto s = write_file(output, format_camera(setup)); !s)
             return fail("calibrate", s.error());
+    }
+    return kDone;
+}
+
+int calibrate_body(int argc, char** argv) {
+    CLI::App app(
+        "Find where the tags of a folded body were glued, from a video in which the body is turned "
+        "slowly to all sides",
+        "sonocase calibrate body");
+    CommonOptions common;
+    std::string video, camera, output, tool = "probe";
+    bool json = false;
+    int max_views = 90;
+    app.add_option("--video", video, "AVI of JPEG pictures (MJPG), or a folder of .jpg files")
+        ->type_name("VIDEO")
+        ->required();
+    app.add_option("--camera", camera, "The camera, as sonocase calibrate camera wrote it")
+        ->type_name("CAMERA.json")
+        ->required();
+    app.add_option("--tool", tool, "Whose body it is")
+        ->check(CLI::IsMember({"probe", "needle"}))
+        ->capture_default_str();
+    app.add_option("-o,--output", output,
+                   "Where to write the camera with the body as built; may be CAMERA.json itself")
+        ->type_name("CAMERA.json");
+    app.add_option("--max-views", max_views, "No more pictures are used")
+        ->check(CLI::Range(15, 400))
+        ->capture_default_str();
+    app.add_flag("--json", json, "Print the result as JSON");
+    add_common_options(app, common);
+    if (const auto status = parse_command_line(app, argc, argv)) return *status;
+    const Stopwatch watch;
+    const auto text = read_text_file(camera);
+    if (!text) return fail("calibrate", text.error());
+    auto setup = parse_camera(*text, camera);
+    if (!setup) return fail("calibrate", setup.error());
+    const std::vector<MarkerBody> bodies = marker_bodies(setup->markers);
+    const MarkerBody& drawn = bodies[tool == "probe" ? 0 : 1];
+    const auto seen = look_at(video, drawn, 2, max_views);
+    if (!seen) return fail("calibrate", seen.error());
+    BodyFit fit;
+    if (seen->views.empty()) {
+        fit.problem = "no picture shows two tags of the " + tool + "'s body";
+    } else {
+        const auto lens = at_size(setup->camera, seen->width_px, seen->height_px);
+        if (!lens) return fail("calibrate", lens.error());
+        fit = fit_body(seen->views, drawn, *lens);
+    }
+    if (json) {
+        Json out;
+        out["views"] = fit.views;
+        out["pictures"] = seen->pictures;
+        out["drawn_rms_px"] = json_number(fit.drawn_rms_px);
+        out["rms_px"] = json_number(fit.rms_px);
+        out["tags"] = Json::array();
+        for (const TagOfBody& tag : fit.tags)
+            out["tags"].push_back({{"id", tag.built.id},
+                                   {"sights", tag.sights},
+                                   {"moved_mm", json_triple(tag.built.moved_mm)},
+                                   {"turned_rad", json_triple(tag.built.turned_rad)},
+                                   {"sigma_mm", json_number(tag.sigma_mm)},
+                                   {"sigma_deg", json_number(tag.sigma_deg)}});
+        out["warnings"] = fit.warnings;
+        out["determined"] = fit.problem.empty();
+        out["problem"] = fit.problem;
+        std::printf("%s\n", out.dump(2).c_str());
+    } else if (fit.rms_px >= 0) {
+        std::printf("corners off by %.2f px rms as drawn, %.2f as built, in %d pictures\n",
+                    fit.drawn_rms_px, fit.rms_px, fit.views);
+        for (const TagOfBody& tag : fit.tags)
+            std::printf(
+                "tag %d: %.2f mm and %.2f degrees from where it is drawn, one sigma %.2f mm and "
+                "%.2f degrees, in %d pictures\n",
+                tag.built.id, norm(tag.built.moved_mm), kDegPerRad * norm(tag.built.turned_rad),
+                tag.sigma_mm, tag.sigma_deg, tag.sights);
+    }
+    StageReport report;
+    report.stage = "calibrate body";
+    report.seconds = watch.seconds();
+    report.measures = {{"views", static_cast<double>(fit.views)},
+                       {"drawn_rms_px", fit.drawn_rms_px},
+                       {"rms_px", fit.rms_px},
+                       {"worst_moved_mm", fit.worst_moved_mm},
+                       {"worst_turned_deg", fit.worst_turned_deg}};
+    report.warnings.assign(fit.warnings.begin(), fit.warnings.end());
+    print_warnings("calibrate", report);
+    if (auto s = write_report(common, report); !s) return fail("calibrate", s.error());
+    if (!fit.problem.empty()) return fail("calibrate", {fit.problem, video, ""});
+    if (!output.empty()) {
+        std::vector<BuiltTag>& built = setup->built;
+        built.erase(std::remove_if(
+                        built.begin(), built.end(),
+                        [&](const BuiltTag& tag) { return find_tag({drawn}, tag.id).body == 0; }),
+                    built.end());
+        for (const TagOfBody& tag : fit.tags) built.push_back(tag.built);
+        std::sort(built.begin(), built.end(),
+                  [](const BuiltTag& a, const BuiltTag& b) { return a.id < b.id; });
+        if (auto s = write_file(output, format_camera(*setup)); !s)
+            return fail("calibrate", s.error());
+        std::fprintf(stderr,
+                     "sonocase calibrate: note: the body's frame is that of its tags as built: "
+                     "calibrate the way to the %s's %s after this, by a pivot\n",
+                     tool.c_str(), tool == "probe" ? "face" : "tip");
     }
     return kDone;
 }

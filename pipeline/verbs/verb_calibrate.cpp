@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// sonocase calibrate point|direction|needle|mannequin|image|lag|camera
+// sonocase calibrate point|direction|needle|mannequin|image|lag|camera|body
 #include "pipeline/verbs/verb_calibrate.h"
 
 #include <cmath>
@@ -208,6 +208,7 @@ constexpr SubVerb kSubVerbs[] = {
     {"lag", "how much later one recording shows a motion than another", calibrate_lag},
 #ifdef SONOCASE_CAMERA
     {"camera", "a camera's lens, from a video of the printed board", calibrate_camera},
+    {"body", "where a folded body's tags were glued, from a video of it turning", calibrate_body},
 #endif
 };
 

@@ -57,5 +57,6 @@ int calibrate_mannequin(int argc, char** argv);
 int calibrate_image(int argc, char** argv);
 int calibrate_lag(int argc, char** argv);
 int calibrate_camera(int argc, char** argv);
+int calibrate_body(int argc, char** argv);
 
 }  // namespace sonocase::pipeline::inline verbs

@@ -96,6 +96,7 @@ int tradeoff(const TradeoffOptions& options) {
     // These need data or programs that packages lack, and run only where they are named.
     if (asked("colour")) makers.push_back(colour_suite);
     if (asked("spectrum")) makers.push_back(spectrum_suite);
+    if (asked("camera")) makers.push_back(camera_suite);
     if (asked("press")) makers.push_back([data = options.data] { return press_suite(data); });
     if (!options.recipe.empty()) {
         RecipeOverrides overrides;
@@ -190,7 +191,7 @@ int verb_tradeoff(int argc, char** argv) {
     std::vector<std::string> names{"all"};
     for (const NamedSuite& named : suites())
         if (names.back() != named.name) names.emplace_back(named.name);
-    for (const char* name : {"press", "colour", "spectrum"}) names.emplace_back(name);
+    for (const char* name : {"press", "colour", "spectrum", "camera"}) names.emplace_back(name);
     app.add_option("--suite", options.suites,
                    "Which stage; may be repeated. All but the last three unless --case is given")
         ->allow_extra_args(false)

@@ -34,6 +34,9 @@ struct TrackerHealth {
     std::string device;  // "Polhemus Viper", with its serial where it has one
     Message message;     // a whole sentence for the user; empty when all is well
     double rate_hz = 0;  // measured
+    // From what the device measures to the reading, over which poses are predicted; negative: not
+    // known, and not predicted.
+    double late_s = -1;
     std::uint64_t readings = 0;
     std::uint64_t bad_frames = 0;  // discarded: wrong checksum or length, not a number
     std::uint64_t connects = 0;

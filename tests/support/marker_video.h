@@ -134,11 +134,27 @@ class MarkerVideo {
         }
         return faces;
     }
+    // Where tags were glued askew faces cut each other.
+    static bool is_convex(const MarkerBody& body) {
+        for (const MarkerFace& face : body.faces) {
+            const Vector3 out = normalized(
+                cross(face.corners[1] - face.corners[0], face.corners[2] - face.corners[1]));
+            for (const MarkerFace& other : body.faces)
+                for (const Point3& corner : other.corners)
+                    if (dot(out, corner - face.corners[0]) > 1e-6) return false;
+        }
+        return true;
+    }
     // Grey of the paper where a ray from `eye` along `ray`, in the frame of the body, meets it;
-    // negative: nowhere. Bodies are convex, so that the order of the faces does not matter: the one
-    // that was met last is tried first.
-    static double cast(
-        const std::vector<Face>& faces, std::size_t& last, Point3 eye, Vector3 ray, Vector3 light) {
+    // negative: nowhere. The order of the faces does not matter for a convex body: the one that was
+    // met last is tried first. Of another the nearest face counts.
+    static double cast(const std::vector<Face>& faces,
+                       bool convex,
+                       std::size_t& last,
+                       Point3 eye,
+                       Vector3 ray,
+                       Vector3 light) {
+        double nearest = 1e9, grey = -1;
         for (std::size_t turn = 0; turn <= faces.size(); ++turn) {
             const std::size_t index = turn == 0 ? last : turn - 1;
             if (turn > 0 && index == last) continue;
@@ -146,7 +162,7 @@ class MarkerVideo {
             const double slope = dot(face.out, ray);
             if (slope >= 0) continue;
             const double t = (face.height - dot(face.out, eye - Point3{})) / slope;
-            if (t <= 0) continue;
+            if (t <= 0 || t >= nearest) continue;
             const Vector3 at = eye + t * ray - face.origin;
             const double u = dot(face.x, at), v = dot(face.y, at);
             bool within = true;
@@ -163,9 +179,11 @@ class MarkerVideo {
                 const int row = static_cast<int>((face.half_tag_mm - v) / face.cell_mm);
                 white = tag_cell_is_white(face.id, row, column);
             }
-            return shade * (white ? 215 : 35);
+            grey = shade * (white ? 215 : 35);
+            nearest = t;
+            if (convex) break;
         }
-        return -1;
+        return grey;
     }
 
     void paint(const PlacedBody& placed,
@@ -175,6 +193,7 @@ class MarkerVideo {
         constexpr int kAcross = 4, kSamples = kAcross * kAcross;
         const int w = camera_.width_px, h = camera_.height_px;
         const std::vector<Face> faces = faces_of(*placed.body);
+        const bool convex = is_convex(*placed.body);
         const double span_s = 0.5 * (options.exposure_s + options.readout_s);
         double x0 = 1e9, x1 = -1e9, y0 = 1e9, y1 = -1e9;
         for (const double t : {time_s - span_s, time_s, time_s + span_s})
@@ -227,7 +246,7 @@ class MarkerVideo {
                         (1 - fy) * ((1 - fx) * a + fx * b) + fy * ((1 - fx) * c + fx * d);
                     const Eye& eye = eyes[(k * 5 + shift) & (kSamples - 1)];
                     const double grey =
-                        cast(faces, last, eye.at, eye.body_from_camera * ray, eye.light);
+                        cast(faces, convex, last, eye.at, eye.body_from_camera * ray, eye.light);
                     sum += grey < 0 ? under : grey;
                 }
                 part[static_cast<std::size_t>(y) * rw + x] = static_cast<float>(sum / kSamples);

@@ -4,6 +4,7 @@
 #include <imgui.h>
 
 #include <cstdio>
+#include <map>
 
 #include "runtime/player/ui/panels.h"
 #include "runtime/player/ui/parts/panel_parts.h"
@@ -89,9 +90,30 @@ std::optional<std::string> draw_choice(const std::string& spec, const std::vecto
     }
     ImGui::SetNextItemWidth(-1);
     if (!ImGui::BeginCombo("##tracker", shown.c_str())) return chosen;
-    for (const TrackerKind& kind : tracker_kinds()) {
+    // Devices are looked for when the list opens.
+    static std::vector<std::vector<TrackerChoice>> devices;
+    // A lens was measured of one camera: its file comes back with that camera and with no other.
+    static std::map<std::string, std::string> with_file;
+    if (const std::size_t comma = spec.find(','); comma != std::string::npos)
+        with_file[spec.substr(0, comma)] = spec;
+    if (ImGui::IsWindowAppearing() || devices.size() != tracker_kinds().size()) {
+        devices.clear();
+        for (const TrackerKind& kind : tracker_kinds())
+            devices.push_back(kind.choices ? kind.choices() : std::vector<TrackerChoice>());
+    }
+    for (std::size_t k = 0; k < tracker_kinds().size(); ++k) {
+        const TrackerKind& kind = tracker_kinds()[k];
         if (kind.name && ImGui::Selectable(tr(kind.name), spec == kind.panel_spec))
             chosen = kind.panel_spec;
+        for (const TrackerChoice& device : devices[k]) {
+            const auto known = with_file.find(device.spec);
+            const std::string& wanted = known == with_file.end() ? device.spec : known->second;
+            if (ImGui::Selectable(("    " + device.name + "##" + device.spec).c_str(),
+                                  spec == wanted))
+                chosen = wanted;
+        }
+        if (kind.choices && devices[k].empty())
+            ImGui::TextDisabled("    %s", tr("No camera is connected"));
     }
     for (const Sweep& sweep : sweeps) {
         const std::string sweep_spec = "sweep:" + sweep.name;
@@ -129,6 +151,7 @@ void draw_health(const TrackerHealth& health) {
     const bool failed = health.phase == TrackerPhase::failed;
     if (health.phase == TrackerPhase::streaming) {
         if (health.rate_hz > 0) row("Rate", "%.0f Hz", health.rate_hz);
+        if (health.late_s >= 0) row("Predicted over", "%.0f ms", 1e3 * health.late_s);
     } else {
         row("State", tr(phase_name(health.phase)), failed ? colour::kBad : colour::kWarn);
     }

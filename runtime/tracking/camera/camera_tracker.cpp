@@ -9,6 +9,7 @@
 #include "formats/files/atomic_file.h"
 #include "formats/files/jpeg_video.h"
 #include "formats/markers/detect/tag_detector.h"
+#include "formats/markers/pose_predictor.h"
 
 namespace sonocase::runtime::inline tracking_camera {
 namespace {
@@ -142,9 +143,13 @@ void CameraTracker::stream(PictureSource& source) {
         ++health_.connects;
     }
     PictureFollower follower(std::move(*detector),
-                             MarkerFollower(*camera, marker_bodies(options_.setup.markers)));
+                             MarkerFollower(*camera, marker_bodies(options_.setup)));
+    std::vector<PosePredictor> predictors;
+    for (const MarkerRole role : {MarkerRole::probe, MarkerRole::needle})
+        predictors.emplace_back(follower.follower().body(role)->body_from_tool * Point3{});
     EmptyPictures empty;
     GreyImage picture;
+    double late_s = -1;
     double last_s = -1, period_s = 0;
     constexpr double kSilenceS = 3;
     double heard_s = clock_();
@@ -172,16 +177,18 @@ void CameraTracker::stream(PictureSource& source) {
         reading.sequence = ++sequence_;
         reading.time_s = clock_();
         reading.device_time_s = time_s;
+        const double took_s = reading.time_s - time_s;
+        late_s = late_s < 0 ? took_s : 0.9 * late_s + 0.1 * took_s;
         reading.sensor_count = 2;
         for (int k = 0; k < 2; ++k) {
             SensorReading& sensor = reading.sensors[k];
             sensor.state = state_of(seen.tools[k].status);
-            sensor.world_from_sensor = seen.tools[k].world_from_body;
+            sensor.world_from_sensor = predictors[k].follow(seen.tools[k], time_s, reading.time_s);
             // 1 at a tenth of a millimetre, 0.5 at one.
             sensor.quality = seen.tools[k].sigma_mm < 0
                                  ? 0
                                  : static_cast<float>(1 / (1 + seen.tools[k].sigma_mm));
-            sensor.time_s = time_s;
+            sensor.time_s = reading.time_s;  // what the pose is for
         }
         box_.publish(reading);
         if (last_s >= 0)
@@ -196,6 +203,7 @@ void CameraTracker::stream(PictureSource& source) {
             health_.phase = TrackerPhase::streaming;
             health_.message = message;
             health_.rate_hz = period_s > 0 ? 1 / period_s : 0;
+            health_.late_s = late_s;
             ++health_.readings;
             wake = wake_;
         }
@@ -226,7 +234,7 @@ Result<Recording> load_camera_video(const std::string& path, const CameraTracker
                              model_for(options, picture.width_px, picture.height_px));
                 SONOCASE_TRY(TagDetector detector, TagDetector::create());
                 follower.emplace(std::move(detector),
-                                 MarkerFollower(camera, marker_bodies(options.setup.markers)));
+                                 MarkerFollower(camera, marker_bodies(options.setup)));
             }
             const CameraModel& camera = follower->follower().camera();
             if (picture.width_px != camera.width_px || picture.height_px != camera.height_px)

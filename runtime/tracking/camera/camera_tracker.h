@@ -3,9 +3,10 @@
 // One camera and printed markers as a tracker: sensor 0 is the probe's body, sensor 1 the needle's;
 // world is the board (formats/markers/marker_set.h).
 //
-// A live camera is read by a thread of its own, which hands readings over. A reading bears the time
-// of its picture's exposure, so that its age is known; it is not predicted beyond that. A pose
-// whose spread is too wide to be trusted is `poor`, one tag alone always.
+// A live camera is read by a thread of its own, which hands readings over. Their poses are
+// predicted over the time from the picture's exposure to the reading, which health() tells
+// (formats/markers/pose_predictor.h). A pose whose spread is too wide to be trusted is `poor`, one
+// tag alone always.
 #pragma once
 
 #include <atomic>
@@ -39,10 +40,6 @@ class PictureSource {
 // Opens a camera. An error with an empty `where` means that there is none yet; others, such as a
 // camera that another program uses, are shown. Either way it is tried again.
 using OpenSource = std::function<Result<std::unique_ptr<PictureSource>>()>;
-
-// /dev/videoN by V4L2, as MJPEG or YUYV of 1280 x 720 where the camera has it, at its highest rate,
-// with an exposure that does not slow it down. number -1: the first that gives pictures.
-Result<std::unique_ptr<PictureSource>> open_v4l2_camera(int number);
 
 // The camera of nothing is known: it is taken to see kAssumedViewDeg across, and the sheets to be
 // as drawn.

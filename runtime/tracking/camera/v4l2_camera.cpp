@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
+#include "runtime/tracking/camera/v4l2_camera.h"
+
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -14,32 +16,40 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include "runtime/tracking/camera/camera_tracker.h"
-
 namespace sonocase::runtime::inline tracking_camera {
 namespace {
 
 constexpr int kCameras = 64;  // /dev/video0 to /dev/video63
 constexpr std::size_t kBuffers = 3;
 
-int control(int file, unsigned long request, void* argument) {
-    int status;
-    do status = ioctl(file, request, argument);
-    while (status < 0 && errno == EINTR);
-    return status;
+// What a file of /dev says that it is; false: no camera that streams.
+bool describe(VideoCalls& calls, int file, std::string& name) {
+    v4l2_capability can{};
+    if (calls.control(file, VIDIOC_QUERYCAP, &can) < 0) return false;
+    const std::uint32_t caps =
+        can.capabilities & V4L2_CAP_DEVICE_CAPS ? can.device_caps : can.capabilities;
+    if (!(caps & V4L2_CAP_VIDEO_CAPTURE) || !(caps & V4L2_CAP_STREAMING)) return false;
+    name.assign(reinterpret_cast<const char*>(can.card),
+                strnlen(reinterpret_cast<const char*>(can.card), sizeof can.card));
+    return true;
+}
+
+std::string path_of(int number) {
+    return "/dev/video" + std::to_string(number);
 }
 
 class V4l2Camera final : public PictureSource {
   public:
-    explicit V4l2Camera(GreyJpegReader reader) : reader_(std::move(reader)) {}
+    V4l2Camera(GreyJpegReader reader, VideoCalls& calls)
+        : reader_(std::move(reader)), calls_(calls) {}
     ~V4l2Camera() override {
         if (streaming_) {
             int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-            control(file_, VIDIOC_STREAMOFF, &type);
+            calls_.control(file_, VIDIOC_STREAMOFF, &type);
         }
         for (const auto& [memory, size] : buffers_)
-            if (memory) munmap(memory, size);
-        if (file_ >= 0) close(file_);
+            if (memory) calls_.unmap(memory, size);
+        if (file_ >= 0) calls_.close(file_);
     }
     V4l2Camera(const V4l2Camera&) = delete;
     V4l2Camera& operator=(const V4l2Camera&) = delete;
@@ -49,30 +59,25 @@ class V4l2Camera final : public PictureSource {
     int height_px() const override { return height_px_; }
 
     Status open(int number) {
-        const std::string path = "/dev/video" + std::to_string(number);
-        file_ = ::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
+        const std::string path = path_of(number);
+        file_ = calls_.open(path.c_str());
         if (file_ < 0) {
             if (errno == EACCES)
                 return Error{"This user may not use the camera.", path,
                              "add the user to the group video, and log in again"};
             return Error{"No camera is connected", "", "connect one"};
         }
-        v4l2_capability can{};
-        if (control(file_, VIDIOC_QUERYCAP, &can) < 0 ||
-            !(can.device_caps & V4L2_CAP_VIDEO_CAPTURE) || !(can.device_caps & V4L2_CAP_STREAMING))
+        if (!describe(calls_, file_, name_))
             return Error{"No camera is connected", "", "connect one"};
-        name_.assign(reinterpret_cast<const char*>(can.card),
-                     strnlen(reinterpret_cast<const char*>(can.card), sizeof can.card));
         if (Status done = choose_format(path); !done) return done;
         choose_rate();
         return start(path);
     }
 
     Result<bool> next(GreyImage& picture, double& age_s) override {
-        pollfd waiting{file_, POLLIN, 0};
-        const int ready = poll(&waiting, 1, 100);
-        if (ready == 0 || (ready < 0 && errno == EINTR)) return false;
-        if (ready < 0 || (waiting.revents & (POLLERR | POLLHUP | POLLNVAL))) return unplugged();
+        const int ready = calls_.wait(file_);
+        if (ready == 0) return false;
+        if (ready < 0) return unplugged();
         // The newest one: what waited longer is old.
         v4l2_buffer newest{};
         bool have = false;
@@ -80,11 +85,11 @@ class V4l2Camera final : public PictureSource {
             v4l2_buffer buffer{};
             buffer.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
             buffer.memory = V4L2_MEMORY_MMAP;
-            if (control(file_, VIDIOC_DQBUF, &buffer) < 0) {
+            if (calls_.control(file_, VIDIOC_DQBUF, &buffer) < 0) {
                 if (errno == EAGAIN) break;
                 return unplugged();
             }
-            if (have && control(file_, VIDIOC_QBUF, &newest) < 0) return unplugged();
+            if (have && calls_.control(file_, VIDIOC_QBUF, &newest) < 0) return unplugged();
             newest = buffer;
             have = true;
         }
@@ -97,7 +102,7 @@ class V4l2Camera final : public PictureSource {
                 1e-6 * static_cast<double>(newest.timestamp.tv_usec);
         // A driver whose clock is another one.
         if (!(age_s >= 0 && age_s < 1)) age_s = 0;
-        if (control(file_, VIDIOC_QBUF, &newest) < 0) return unplugged();
+        if (calls_.control(file_, VIDIOC_QBUF, &newest) < 0) return unplugged();
         return read;
     }
 
@@ -112,7 +117,7 @@ class V4l2Camera final : public PictureSource {
             wanted.fmt.pix.height = 720;
             wanted.fmt.pix.pixelformat = format;
             wanted.fmt.pix.field = V4L2_FIELD_NONE;
-            if (control(file_, VIDIOC_S_FMT, &wanted) < 0) {
+            if (calls_.control(file_, VIDIOC_S_FMT, &wanted) < 0) {
                 if (errno == EBUSY)
                     return Error{"Another program uses the camera.", path, "close that program"};
                 continue;
@@ -132,11 +137,11 @@ class V4l2Camera final : public PictureSource {
         v4l2_streamparm rate{};
         rate.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
         rate.parm.capture.timeperframe = {1, 60};
-        control(file_, VIDIOC_S_PARM, &rate);
+        calls_.control(file_, VIDIOC_S_PARM, &rate);
         // In a dark room a camera may expose for longer than a picture's time: the picture would
         // come late and blurred.
         v4l2_control exposure{V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0};
-        control(file_, VIDIOC_S_CTRL, &exposure);
+        calls_.control(file_, VIDIOC_S_CTRL, &exposure);
     }
 
     Status start(const std::string& path) {
@@ -145,21 +150,20 @@ class V4l2Camera final : public PictureSource {
         wanted.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
         wanted.memory = V4L2_MEMORY_MMAP;
         const Error busy{"Another program uses the camera.", path, "close that program"};
-        if (control(file_, VIDIOC_REQBUFS, &wanted) < 0 || wanted.count == 0) return busy;
+        if (calls_.control(file_, VIDIOC_REQBUFS, &wanted) < 0 || wanted.count == 0) return busy;
         for (std::uint32_t k = 0; k < std::min<std::uint32_t>(wanted.count, kBuffers); ++k) {
             v4l2_buffer buffer{};
             buffer.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
             buffer.memory = V4L2_MEMORY_MMAP;
             buffer.index = k;
-            if (control(file_, VIDIOC_QUERYBUF, &buffer) < 0) return busy;
-            void* memory = mmap(nullptr, buffer.length, PROT_READ | PROT_WRITE, MAP_SHARED, file_,
-                                static_cast<off_t>(buffer.m.offset));
-            if (memory == MAP_FAILED) return busy;
+            if (calls_.control(file_, VIDIOC_QUERYBUF, &buffer) < 0) return busy;
+            void* memory = calls_.map(file_, buffer.length, buffer.m.offset);
+            if (!memory) return busy;
             buffers_[k] = {memory, buffer.length};
-            if (control(file_, VIDIOC_QBUF, &buffer) < 0) return busy;
+            if (calls_.control(file_, VIDIOC_QBUF, &buffer) < 0) return busy;
         }
         int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-        if (control(file_, VIDIOC_STREAMON, &type) < 0) return busy;
+        if (calls_.control(file_, VIDIOC_STREAMON, &type) < 0) return busy;
         streaming_ = true;
         return Done{};
     }
@@ -183,6 +187,7 @@ class V4l2Camera final : public PictureSource {
     }
 
     GreyJpegReader reader_;
+    VideoCalls& calls_;
     int file_ = -1;
     bool streaming_ = false, jpeg_ = false;
     std::string name_;
@@ -193,16 +198,58 @@ class V4l2Camera final : public PictureSource {
 
 }  // namespace
 
-Result<std::unique_ptr<PictureSource>> open_v4l2_camera(int number) {
+int VideoCalls::open(const char* path) {
+    return ::open(path, O_RDWR | O_NONBLOCK | O_CLOEXEC);
+}
+void VideoCalls::close(int file) {
+    ::close(file);
+}
+int VideoCalls::control(int file, unsigned long request, void* argument) {
+    int status;
+    do status = ioctl(file, request, argument);
+    while (status < 0 && errno == EINTR);
+    return status;
+}
+void* VideoCalls::map(int file, std::size_t size, long offset) {
+    void* memory = mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED, file, offset);
+    return memory == MAP_FAILED ? nullptr : memory;
+}
+void VideoCalls::unmap(void* memory, std::size_t size) {
+    munmap(memory, size);
+}
+int VideoCalls::wait(int file) {
+    pollfd waiting{file, POLLIN, 0};
+    const int ready = poll(&waiting, 1, 100);
+    if (ready < 0) return errno == EINTR ? 0 : -1;
+    return waiting.revents & (POLLERR | POLLHUP | POLLNVAL) ? -1 : ready;
+}
+VideoCalls& system_video() {
+    static VideoCalls calls;
+    return calls;
+}
+
+Result<std::unique_ptr<PictureSource>> open_v4l2_camera(int number, VideoCalls& calls) {
     Error first{"No camera is connected", "", "connect one"};
     for (int n = std::max(0, number); n < (number < 0 ? kCameras : number + 1); ++n) {
         SONOCASE_TRY(GreyJpegReader reader, GreyJpegReader::create());
-        auto camera = std::make_unique<V4l2Camera>(std::move(reader));
+        auto camera = std::make_unique<V4l2Camera>(std::move(reader), calls);
         Status opened = camera->open(n);
         if (opened) return std::unique_ptr<PictureSource>(std::move(camera));
         if (first.where.empty() && !opened.error().where.empty()) first = opened.error();
     }
     return first;
+}
+
+std::vector<CameraDevice> v4l2_cameras(VideoCalls& calls) {
+    std::vector<CameraDevice> found;
+    for (int n = 0; n < kCameras; ++n) {
+        const int file = calls.open(path_of(n).c_str());
+        if (file < 0) continue;
+        CameraDevice device{n, ""};
+        if (describe(calls, file, device.name)) found.push_back(std::move(device));
+        calls.close(file);
+    }
+    return found;
 }
 
 }  // namespace sonocase::runtime::inline tracking_camera

@@ -11,7 +11,7 @@
 #include "runtime/tracking/scripted_sweep.h"
 #include "runtime/tracking/tracker.h"
 #ifdef SONOCASE_CAMERA
-#include "runtime/tracking/camera/camera_tracker.h"
+#include "runtime/tracking/camera/v4l2_camera.h"
 #endif
 
 namespace sonocase::runtime::inline tracking_devices {
@@ -117,6 +117,13 @@ Made make_camera(const std::string& argument, const TrackerContext& context) {
     SONOCASE_TRY(Recording recording, load_camera_video(camera.video, camera.options));
     return Made(std::make_unique<ReplayTracker>(std::move(recording), context.loop));
 }
+
+std::vector<TrackerChoice> cameras() {
+    std::vector<TrackerChoice> out;
+    for (const CameraDevice& device : v4l2_cameras())
+        out.push_back({device.name, "camera:" + std::to_string(device.number)});
+    return out;
+}
 #endif
 
 template <std::unique_ptr<UsbDriver> (*make_driver)()>
@@ -137,7 +144,7 @@ constexpr TrackerKind kTrackers[] = {
      "igtl:127.0.0.1:18944", kNotStepped, make_igtl, true},
 #ifdef SONOCASE_CAMERA
     {"camera", "camera[:N|VIDEO][,CAMERA.json]", kOptional, "Camera and printed markers", "camera",
-     kStepped, make_camera},
+     kStepped, make_camera, false, cameras},
 #endif
     {"viper", "viper", kNone, "Polhemus Viper", "viper", kStepped, make_usb<make_viper_driver>},
     {"3dg", "3dg", kNone, "NDI 3D Guidance", "3dg", kStepped, make_usb<make_guidance_driver>},

@@ -37,6 +37,11 @@ struct TrackerContext {
     ToolNames tools;          // of OpenIGTLink and recordings; empty: by the names
 };
 
+// One of several devices of a kind: "HD Webcam", "camera:0".
+struct TrackerChoice {
+    std::string name, spec;
+};
+
 struct TrackerKind {
     const char* prefix;  // a specification up to its colon: "replay"
     // Specifications as the help writes them, " | " between two: "replay:FILE[,NEEDLE_FILE]".
@@ -51,6 +56,9 @@ struct TrackerKind {
                                              const TrackerContext& context);
     // Knows its sensors by the names it hears, and puts those with a role in their places.
     bool names_sensors = false;
+    // The devices that are there, for the panel; null: the kind has no more than one. Asks the
+    // system: not for every frame.
+    std::vector<TrackerChoice> (*choices)() = nullptr;
 };
 
 // Every kind, in the order of the help.

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -19,6 +20,7 @@
 
 #include "formats/base/constants.h"
 #include "formats/markers/detect/tag_detector.h"
+#include "formats/markers/pose_predictor.h"
 #include "support/marker_jpeg.h"
 #include "support/marker_video.h"
 
@@ -202,8 +204,11 @@ TEST_F(MarkerPose, WhatIsCalledGoodIsRightWhileTheBoardIsTheWorld) {
         return table * p;
     };
     PictureFollower follower(std::move(*detector_), MarkerFollower(camera_, bodies_));
-    int good = 0, lost = 0;
+    PosePredictor predictor(bodies_[0].body_from_tool * Point3{});
+    constexpr double kLateS = 0.045;
+    int good = 0, lost = 0, predicted = 0, since_lost = 0;
     double square_mm = 0, worst_mm = 0, worst_deg = 0;
+    double late_mm = 0, predicted_mm = 0, predicted_worst_deg = 0;
     constexpr double kFrameS = 1 / 30.0;
     constexpr int kFrames = 40;
     for (int i = 0; i < kFrames; ++i) {
@@ -224,10 +229,23 @@ TEST_F(MarkerPose, WhatIsCalledGoodIsRightWhileTheBoardIsTheWorld) {
         }
         lost += reading.status == MarkerStatus::lost;
         EXPECT_EQ(seen.tools[1].status, MarkerStatus::lost);
+        const Rigid now = predictor.follow(reading, t, t + kLateS);
+        since_lost = reading.status == MarkerStatus::lost ? 0 : since_lost + 1;
         if (reading.status != MarkerStatus::good) continue;
         ++good;
         const Point3 tool = bodies_[0].body_from_tool * Point3{};
         const Rigid truth = inverse(board) * probe(t);
+        // Where it is when the pose has come.
+        const Rigid then = inverse(board) * probe(t + kLateS);
+        constexpr int kStarted = 5;  // pictures
+        if (since_lost > kStarted) {
+            const double late = distance(reading.world_from_body * tool, then * tool);
+            const double left = distance(now * tool, then * tool);
+            late_mm += late * late, predicted_mm += left * left, ++predicted;
+            predicted_worst_deg =
+                std::max(predicted_worst_deg,
+                         kDegPerRad * rotation_angle(transpose(then.rotation) * now.rotation));
+        }
         const double off = distance(reading.world_from_body * tool, truth * tool);
         const double deg = kDegPerRad * rotation_angle(transpose(truth.rotation) *
                                                        reading.world_from_body.rotation);
@@ -239,6 +257,10 @@ TEST_F(MarkerPose, WhatIsCalledGoodIsRightWhileTheBoardIsTheWorld) {
     EXPECT_LE(std::sqrt(square_mm / good), 1.5);
     EXPECT_LE(worst_mm, 5);
     EXPECT_LE(worst_deg, 2);
+    ASSERT_GE(predicted, 10);
+    EXPECT_LE(std::sqrt(predicted_mm / predicted), 1.5);
+    EXPECT_LE(predicted_worst_deg, 1);
+    EXPECT_LE(predicted_mm, 0.2 * late_mm);
 }
 
 TEST_F(MarkerPose, OneTagAloneIsNeverCalledGood) {
@@ -254,6 +276,45 @@ TEST_F(MarkerPose, OneTagAloneIsNeverCalledGood) {
         const TagFindings found = look({still_body(one, pose)}, i / 30.0);
         EXPECT_NE(follower.follow(found.tags, found.twice, 0, i / 30.0).tools[0].status,
                   MarkerStatus::good);
+    }
+}
+
+TEST_F(MarkerPose, ACameraThatHangsUpsideDownSeesTheSame) {
+    const Rigid table = camera_from_table(600, 60 * kRadPerDeg);
+    const Rigid board{table.rotation, table * Point3{0, 110, 0} - Point3{}};
+    const Rigid probe{table.rotation, table * Point3{0, -60, 110} - Point3{}};
+    // A lens without distortion: turned about, it is the same lens.
+    const CameraModel plain = assumed_camera(1280, 720);
+    MarkerVideo video(plain);
+    std::vector<std::uint8_t> grey =
+        video.take({still_body(bodies_[2], board), still_body(bodies_[0], probe)}, 0);
+    std::reverse(grey.begin(), grey.end());
+    PictureFollower follower(std::move(*detector_), MarkerFollower(plain, bodies_));
+    const MarkerReading reading = follower.follow({grey.data(), 1280, 720, 1280}, 0).tools[0];
+    ASSERT_EQ(reading.status, MarkerStatus::good);
+    const Point3 tool = bodies_[0].body_from_tool * Point3{};
+    EXPECT_LT(distance(reading.world_from_body * tool, inverse(board) * probe * tool), 1.5);
+}
+
+TEST_F(MarkerPose, APictureOfTheSheetOnAScreenIsNoTool) {
+    // All tags of the probe's body, flat side by side, as the unfolded sheet has them.
+    MarkerBody flat = bodies_[0];
+    for (std::size_t t = 0; t < flat.tags.size(); ++t) {
+        const double x = (static_cast<double>(t % 4) - 1.5) * 34, y = t < 4 ? 17 : -17;
+        flat.tags[t].body_from_tag = {{}, {x, y, 0}};
+        flat.faces[t].corners = {
+            {x - 17, y - 17, 0}, {x + 17, y - 17, 0}, {x + 17, y + 17, 0}, {x - 17, y + 17, 0}};
+        flat.faces[t].tag = static_cast<int>(t);
+    }
+    const Rigid table = camera_from_table(600, 60 * kRadPerDeg);
+    const Rigid board{table.rotation, table * Point3{-110, 60, 0} - Point3{}};
+    PictureFollower follower(std::move(*detector_), MarkerFollower(camera_, bodies_));
+    for (int i = 0; i < 2; ++i) {
+        const Rigid screen{table.rotation * rotation_about({1, 0, 0}, 0.4 * i),
+                           table * Point3{90, -20, 40} - Point3{}};
+        const FollowerPicture seen = follower.follow(
+            picture_of({still_body(bodies_[2], board), still_body(flat, screen)}, i), i / 30.0);
+        EXPECT_NE(seen.tools[0].status, MarkerStatus::good) << i;
     }
 }
 

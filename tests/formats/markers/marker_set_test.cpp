@@ -144,6 +144,7 @@ TEST(CameraModel, DerivativesAreThoseOfDifferences) {
 TEST(CameraModel, AFileReadsBackAndNonsenseIsRefused) {
     CameraSetup setup;
     setup.markers.ruler_mm = 97.5;
+    setup.built = {{3, {1, -0.5, 0.25}, {0.01, 0, -0.02}}, {9, {0, 0, 1.75}, {}}};
     CameraModel& camera = setup.camera;
     camera = assumed_camera(1920, 1080);
     camera.k1 = -0.07, camera.rms_px = 0.21, camera.sigma_focal_px = 1.5, camera.pictures = 30;
@@ -155,6 +156,9 @@ TEST(CameraModel, AFileReadsBackAndNonsenseIsRefused) {
     for (const auto& [from, to] : {std::pair<std::string, std::string>{"\"focal_px\"", "\"focal\""},
                                    {"sonocase camera", "sonocase machine"},
                                    {"97.5", "9.75"},
+                                   {"\"id\": 9", "\"id\": 3"},
+                                   {"1.75", "17.5"},
+                                   {"-0.02", "-0.32"},
                                    {"1920", "19"}}) {
         std::string broken = text;
         broken.replace(broken.find(from), from.size(), to);

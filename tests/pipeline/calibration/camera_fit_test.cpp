@@ -21,12 +21,12 @@ CameraModel true_camera(double view_deg) {
 }
 
 // The board as a camera sees it: tags that lie wholly in the picture, corners off by noise_px.
-BoardView view_of(const CameraModel& camera,
-                  const MarkerBody& board,
-                  const Rigid& camera_from_board,
-                  RandomStream& random,
-                  double noise_px) {
-    BoardView view;
+MarkerView view_of(const CameraModel& camera,
+                   const MarkerBody& board,
+                   const Rigid& camera_from_board,
+                   RandomStream& random,
+                   double noise_px) {
+    MarkerView view;
     for (const MarkerTag& tag : board.tags) {
         SeenTag seen;
         seen.id = tag.id;
@@ -50,14 +50,14 @@ BoardView view_of(const CameraModel& camera,
     return view;
 }
 
-std::vector<BoardView> waved(const CameraModel& camera,
-                             const MarkerBody& board,
-                             int count,
-                             double tilt_deg,
-                             double spread_px,
-                             double noise_px) {
+std::vector<MarkerView> waved(const CameraModel& camera,
+                              const MarkerBody& board,
+                              int count,
+                              double tilt_deg,
+                              double spread_px,
+                              double noise_px) {
     RandomStream random(5);
-    std::vector<BoardView> views;
+    std::vector<MarkerView> views;
     while (static_cast<int>(views.size()) < count) {
         const Matrix3 facing = Matrix3::diagonal({1, -1, -1});  // the board looks at the camera
         Rigid pose;
@@ -68,7 +68,7 @@ std::vector<BoardView> waved(const CameraModel& camera,
         const Vector3 ray = direction_at(camera, {640 + random.uniform(-1, 1) * spread_px,
                                                   360 + random.uniform(-0.56, 0.56) * spread_px});
         pose.translation = random.uniform(330, 600) * ray;
-        BoardView view = view_of(camera, board, pose, random, noise_px);
+        MarkerView view = view_of(camera, board, pose, random, noise_px);
         if (view.tags.size() >= 3) views.push_back(std::move(view));
     }
     return views;

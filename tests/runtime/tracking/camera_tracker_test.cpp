@@ -185,8 +185,10 @@ TEST(CameraTracker, ALiveCameraMayComeGoAndBeTaken) {
     EXPECT_EQ(tracker.health().device, "Camera Played");
     EXPECT_EQ(reading.sensors[kProbeSensor].state, SensorState::ok);
     EXPECT_EQ(reading.sensors[kNeedleSensor].state, SensorState::lost);
-    // The time is that of the exposure.
-    EXPECT_LE(reading.sensors[kProbeSensor].time_s, reading.time_s - 0.02);
+    // The pose is predicted from the exposure to the reading.
+    EXPECT_LE(reading.device_time_s, reading.time_s - 0.02);
+    EXPECT_EQ(reading.sensors[kProbeSensor].time_s, reading.time_s);
+    EXPECT_GE(tracker.health().late_s, 0.02);
     const Rigid truth = inverse(scene.board) * scene.probe(0.5);
     const Point3 face{0, 0, -120};
     EXPECT_LT(distance(reading.sensors[kProbeSensor].world_from_sensor * face, truth * face), 1.5);

@@ -4,7 +4,11 @@
 // is played through the camera's tracker, and the two scores are compared.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+
+#include <unistd.h>
+
 #include <nlohmann/json.hpp>
 
 #include "formats/calibration/calibration.h"
@@ -136,6 +140,33 @@ TEST(CameraAttempt, AFilmedAttemptScoresAsTheTrueOne) {
         ++compared;
     }
     EXPECT_GE(compared, 4);
+
+    // Another program follows the camera's poses by OpenIGTLink, as PLUS and 3D Slicer would: each
+    // that it hears is one of the film's.
+    const std::string port = std::to_string(20000 + getpid() % 20000);
+    const auto heard = sonocase::testing::run_command(
+        "env -u DISPLAY -u WAYLAND_DISPLAY HOME=/nonexistent " SONOCASE_BIN "/sonoplay " + bundle +
+        " --headless --model paper --size 64x64 --frames 1000000 --tracker camera:" + avi + "," +
+        camera + calibrations + " --serve 127.0.0.1:" + port +
+        " > /dev/null 2>&1 & sender=$!; " SONOCASE_BIN "/sonoplay " + bundle +
+        " --headless --model paper --size 64x64 --frames 12 --tracker igtl:127.0.0.1:" + port +
+        " --record " + (folder / "heard.igs.mha") + "; status=$?; kill $sender; exit $status");
+    ASSERT_EQ(heard.status, 0) << heard.error;
+    const auto stream = load_recording_file(folder / "heard.igs.mha");
+    ASSERT_TRUE(stream);
+    int matched = 0;
+    for (const Pose& pose : poses_of(*stream, stream->transform_index("ProbeToMannequin"))) {
+        if (!pose.ok) continue;
+        double nearest = 1e9;
+        for (const Pose& sent : seen_probe)
+            if (sent.ok)
+                nearest = std::min(nearest, distance(pose.tracker_from_tool * Point3{},
+                                                     sent.tracker_from_tool * Point3{}));
+        // Numbers of the protocol have 24 bits.
+        EXPECT_LT(nearest, 0.001);
+        ++matched;
+    }
+    EXPECT_GE(matched, 6);
 }
 
 }  // namespace
