@@ -253,8 +253,9 @@ def test_one_renderer_is_for_one_thread_at_a_time(case, pose):
 def test_ctrl_c_ends_a_batch(small):
     """In a process of its own, whose interrupt comes from another thread while a batch runs."""
     program = f"""
-import _thread, sys, threading
+import _thread, signal, sys, threading
 import numpy as np, sonocase
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
 case = sonocase.Case.open({str(small[0])!r})
 pose = sonocase.Pose.on_skin(case, case.exercise().start_pose[:3, 3], (0, 0, -1))
 renderer = sonocase.Renderer(case, size=(256, 256))
