@@ -4,13 +4,15 @@
 import io
 import json
 import pickle
+import subprocess
 import tarfile
+import zlib
 
 import numpy as np
 import pytest
 
 import sonocase
-from sonocase.data import DataSet, main, write_coco, write_webdataset
+from sonocase.data import DataSet, main, write_coco, write_webdataset, write_zarr
 
 RECIPE = """
 name = "try"
@@ -34,7 +36,6 @@ tip_depth_mm = [10, 30]
 @pytest.fixture(scope="module")
 def made(small, tmp_path_factory):
     from conftest import BIN
-    import subprocess
 
     folder = tmp_path_factory.mktemp("data")
     (folder / "small.sonocase").symlink_to(small[0])
@@ -126,9 +127,61 @@ def test_webdataset_holds_the_frames_and_is_the_same_bytes(made, tmp_path):
     assert seen == 12
 
 
+def read_zarr(folder, name):
+    """An array by the rules of Zarr's version 2: whole chunks, the rest beyond the shape cut off."""
+    assert json.loads((folder / ".zgroup").read_text()) == {"zarr_format": 2}
+    about = json.loads((folder / name / ".zarray").read_text())
+    assert set(about) == {"zarr_format", "shape", "chunks", "dtype", "compressor", "fill_value", "order", "filters"}
+    assert about["zarr_format"] == 2 and about["order"] == "C" and about["filters"] is None
+    shape, chunks = about["shape"], about["chunks"]
+    whole = np.full(shape, float(about["fill_value"]), about["dtype"])
+    for at in np.ndindex(*[-(-s // c) for s, c in zip(shape, chunks)]):
+        content = (folder / name / ".".join(map(str, at))).read_bytes()
+        if about["compressor"] is not None:
+            assert about["compressor"]["id"] == "zlib"
+            content = zlib.decompress(content)
+        chunk = np.frombuffer(content, about["dtype"]).reshape(chunks)
+        place = tuple(slice(a * c, min((a + 1) * c, s)) for a, c, s in zip(at, chunks, shape))
+        whole[place] = chunk[tuple(slice(0, p.stop - p.start) for p in place)]
+        beyond = np.ones(chunks, bool)
+        beyond[tuple(slice(0, p.stop - p.start) for p in place)] = False
+        assert np.array_equal(chunk[beyond], np.full(beyond.sum(), float(about["fill_value"])), equal_nan=True)
+    files = {p.name for p in (folder / name).iterdir()} - {".zarray", ".zattrs"}
+    assert len(files) == -(-shape[0] // chunks[0])
+    return whole
+
+
+@pytest.mark.parametrize("compress", [True, False])
+def test_zarr_holds_the_frames_and_is_the_same_bytes(made, tmp_path, compress):
+    planes = ("labels", "needle", "skin_depth_mm")
+    data = DataSet(made / "npy", planes=planes)
+    for run in "ab":
+        write_zarr(data, tmp_path / run, 5, compress)
+    written = {p.relative_to(tmp_path / "a"): p.read_bytes() for p in (tmp_path / "a").rglob("*") if p.is_file()}
+    assert written == {p.relative_to(tmp_path / "b"): p.read_bytes()
+                       for p in (tmp_path / "b").rglob("*") if p.is_file()}
+    for plane in data.planes:
+        expected = np.stack([frame[plane] for frame in data])
+        found = read_zarr(tmp_path / "a", plane)
+        assert found.dtype == expected.dtype
+        fill = json.loads((tmp_path / "a" / plane / ".zarray").read_text())["fill_value"]
+        assert fill == ("NaN" if plane == "skin_depth_mm" else 0)
+        np.testing.assert_array_equal(found, expected)
+    assert read_zarr(tmp_path / "a", "index").tolist() == [r["index"] for r in data.records]
+    assert json.loads((tmp_path / "a" / ".zattrs").read_text())["classes"] == data.classes
+    together = json.loads((tmp_path / "a" / ".zmetadata").read_text())["metadata"]
+    assert set(together) == {str(p) for p in written if p.name.startswith(".")} - {".zmetadata"}
+    assert together["labels/.zarray"] == json.loads((tmp_path / "a" / "labels" / ".zarray").read_text())
+    assert list(map(json.loads, (tmp_path / "a" / "manifest.jsonl").read_text().splitlines())) == data.records
+    with pytest.raises(sonocase.Error, match="there already"):
+        write_zarr(data, tmp_path / "a")
+
+
 @pytest.mark.parametrize("arguments, words", [
     (["coco", "none", "-o", "x.json"], "dataset.json"), (["coco", "npy", "-o", "x.json"], "png"),
-    (["webdataset", "npy", "-o", "x.tar"], "number")])
+    (["webdataset", "npy", "-o", "x.tar"], "number"), (["zarr", "npy", "-o", "npy"], "there already"),
+    (["zarr", "npy", "-o", "x.zarr", "--split", "validate"], "no frames"),
+    (["zarr", "npy", "-o", "x.zarr", "--frames-per-chunk", "0"], "frames_per_chunk")])
 def test_what_cannot_be_done_is_one_line(made, tmp_path, capsys, monkeypatch, arguments, words):
     monkeypatch.chdir(made)
     assert main(arguments) == 1
