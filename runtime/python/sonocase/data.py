@@ -39,6 +39,20 @@ def _read(path):
     return path
 
 
+def common_classes(palettes, classes=None):
+    """Classes of several cases, and by case an array from its own label to its class.
+
+    palettes   by case, the names of its labels, "outside" first
+    classes    names; by default all of them, "outside" first, the rest by the alphabet
+    """
+    if classes is None:
+        classes = ["outside", *sorted({n for palette in palettes.values() for n in palette[1:]})]
+    index = {name: i for i, name in enumerate(classes)}
+    kind = np.uint8 if len(classes) <= 256 else np.uint16
+    return list(classes), {case: np.array([index.get(n, 0) for n in palette], kind)
+                           for case, palette in palettes.items()}
+
+
 class DataSet:
     """The frames of a data set, in the order of their numbers.
 
@@ -64,12 +78,7 @@ class DataSet:
         self.facts = facts
         palettes = {c["bundle"]: [l["name"] for l in c["labels"]]
                     for c in self.description["cases"]}
-        names = sorted({n for palette in palettes.values() for n in palette[1:]})
-        self.classes = ["outside", *names] if classes is None else list(classes)
-        index = {name: i for i, name in enumerate(self.classes)}
-        kind = np.uint8 if len(self.classes) <= 256 else np.uint16
-        self._class_of = {bundle: np.array([index.get(n, 0) for n in palette], kind)
-                          for bundle, palette in palettes.items()}
+        self.classes, self._class_of = common_classes(palettes, classes)
         self._arrays = {}
 
     def __len__(self):
@@ -121,7 +130,8 @@ def write_coco(data, path):
     Masks are run lengths (pycocotools reads them); file names are relative to the data set's folder.
     """
     if data.records and "image" not in data.records[0]:
-        raise Error(f"{data.folder}: COCO names picture files: ask for format = \"png\"")
+        where = getattr(data, "folder", "frames that are drawn")
+        raise Error(f"{where}: COCO names picture files: ask sonoplay dataset for format = \"png\"")
     categories = [{"id": i, "name": n} for i, n in enumerate(data.classes) if i > 0]
     needle = len(data.classes)
     categories.append({"id": needle, "name": "needle"})
@@ -170,7 +180,8 @@ def write_webdataset(data, pattern, frames_per_shard=1000):
         partial = path.with_name(path.name + ".part")
         with tarfile.open(partial, "w", format=tarfile.USTAR_FORMAT) as tar:
             for i in range(first, min(first + frames_per_shard, len(data))):
-                record, frame = data.records[i], data[i]
+                frame = data[i]
+                record = frame.get("facts") or data.records[i]
                 key = f"{record['index']:08d}"
                 for plane in data.planes:
                     content = io.BytesIO()
@@ -222,7 +233,8 @@ def write_zarr(data, path, frames_per_chunk=16, compress=True):
         for number, first in enumerate(range(0, len(data), frames_per_chunk)):
             planes, indices = {plane: [] for plane in data.planes}, []
             for i in range(first, min(first + frames_per_chunk, len(data))):
-                record, frame = data.records[i], data[i]
+                frame = data[i]
+                record = frame.get("facts") or data.records[i]
                 manifest.write(json.dumps(record) + "\n")
                 indices.append(np.array(record["index"], "<i8"))
                 for plane in data.planes:
