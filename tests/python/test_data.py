@@ -4,13 +4,17 @@
 import io
 import json
 import pickle
+import subprocess
+import sys
 import tarfile
+import zlib
 
 import numpy as np
 import pytest
 
 import sonocase
-from sonocase.data import DataSet, main, write_coco, write_webdataset
+from sonocase.data import DataSet, main, write_coco, write_webdataset, write_zarr
+from sonocase.domain import DrawnFrames, picture
 
 RECIPE = """
 name = "try"
@@ -34,7 +38,6 @@ tip_depth_mm = [10, 30]
 @pytest.fixture(scope="module")
 def made(small, tmp_path_factory):
     from conftest import BIN
-    import subprocess
 
     folder = tmp_path_factory.mktemp("data")
     (folder / "small.sonocase").symlink_to(small[0])
@@ -126,9 +129,161 @@ def test_webdataset_holds_the_frames_and_is_the_same_bytes(made, tmp_path):
     assert seen == 12
 
 
+def read_zarr(folder, name):
+    """An array by the rules of Zarr's version 2: whole chunks, the rest beyond the shape cut off."""
+    assert json.loads((folder / ".zgroup").read_text()) == {"zarr_format": 2}
+    about = json.loads((folder / name / ".zarray").read_text())
+    assert set(about) == {"zarr_format", "shape", "chunks", "dtype", "compressor", "fill_value", "order", "filters"}
+    assert about["zarr_format"] == 2 and about["order"] == "C" and about["filters"] is None
+    shape, chunks = about["shape"], about["chunks"]
+    whole = np.full(shape, float(about["fill_value"]), about["dtype"])
+    for at in np.ndindex(*[-(-s // c) for s, c in zip(shape, chunks)]):
+        content = (folder / name / ".".join(map(str, at))).read_bytes()
+        if about["compressor"] is not None:
+            assert about["compressor"]["id"] == "zlib"
+            content = zlib.decompress(content)
+        chunk = np.frombuffer(content, about["dtype"]).reshape(chunks)
+        place = tuple(slice(a * c, min((a + 1) * c, s)) for a, c, s in zip(at, chunks, shape))
+        whole[place] = chunk[tuple(slice(0, p.stop - p.start) for p in place)]
+        beyond = np.ones(chunks, bool)
+        beyond[tuple(slice(0, p.stop - p.start) for p in place)] = False
+        assert np.array_equal(chunk[beyond], np.full(beyond.sum(), float(about["fill_value"])), equal_nan=True)
+    files = {p.name for p in (folder / name).iterdir()} - {".zarray", ".zattrs"}
+    assert len(files) == -(-shape[0] // chunks[0])
+    return whole
+
+
+@pytest.mark.parametrize("compress", [True, False])
+def test_zarr_holds_the_frames_and_is_the_same_bytes(made, tmp_path, compress):
+    planes = ("labels", "needle", "skin_depth_mm")
+    data = DataSet(made / "npy", planes=planes)
+    for run in "ab":
+        write_zarr(data, tmp_path / run, 5, compress)
+    written = {p.relative_to(tmp_path / "a"): p.read_bytes() for p in (tmp_path / "a").rglob("*") if p.is_file()}
+    assert written == {p.relative_to(tmp_path / "b"): p.read_bytes()
+                       for p in (tmp_path / "b").rglob("*") if p.is_file()}
+    for plane in data.planes:
+        expected = np.stack([frame[plane] for frame in data])
+        found = read_zarr(tmp_path / "a", plane)
+        assert found.dtype == expected.dtype
+        fill = json.loads((tmp_path / "a" / plane / ".zarray").read_text())["fill_value"]
+        assert fill == ("NaN" if plane == "skin_depth_mm" else 0)
+        np.testing.assert_array_equal(found, expected)
+    assert read_zarr(tmp_path / "a", "index").tolist() == [r["index"] for r in data.records]
+    assert json.loads((tmp_path / "a" / ".zattrs").read_text())["classes"] == data.classes
+    together = json.loads((tmp_path / "a" / ".zmetadata").read_text())["metadata"]
+    assert set(together) == {str(p) for p in written if p.name.startswith(".")} - {".zmetadata"}
+    assert together["labels/.zarray"] == json.loads((tmp_path / "a" / "labels" / ".zarray").read_text())
+    assert list(map(json.loads, (tmp_path / "a" / "manifest.jsonl").read_text().splitlines())) == data.records
+    with pytest.raises(sonocase.Error, match="there already"):
+        write_zarr(data, tmp_path / "a")
+
+
+DOMAIN = {
+    "chunk": 2, "model": "physical", "gain_db": [-6, 6],
+    "machine": {"base": ["modern", "classic"], "grey": {"level": [40, 70]}, "looks": {"count": [1, 3]},
+                "tissue_db": {"muscle": [-4, 4]}},
+    "probe": {"depth_mm": {"one_of": [60, 90]}, "frequency_mhz": [2.5, 5]},
+    "pose": {"press_mm": [0, 4]},
+    "needle": {"share": 0.5, "tip_depth_mm": [10, 30], "tent_mm": [0, 2]}}
+
+
+def test_a_sample_is_the_same_in_any_order_and_process(small):
+    frames = DrawnFrames(small[0], DOMAIN, seed=7, count=12, size=(64, 48), facts=True)
+    pictures = [frame["image"] for frame in frames]
+    records = [json.loads(json.dumps(r)) for r in frames.records]
+    other = pickle.loads(pickle.dumps(frames))  # as a loader's workers get it
+    for i in (11, 0, 7, 3):
+        again = other[i]
+        np.testing.assert_array_equal(again["image"], pictures[i])
+        assert {k: v for k, v in again["facts"].items() if k != "truth"} == records[i]
+        np.testing.assert_array_equal(picture(records[i]), pictures[i])  # of its record alone
+    program = ("import json, sys; from sonocase.domain import DrawnFrames; "
+               "print(json.dumps(DrawnFrames(sys.argv[1], json.loads(sys.argv[2]), 7, 8, size=(64, 48)).records[7]))")
+    apart = subprocess.run([sys.executable, "-c", program, small[0], json.dumps(DOMAIN)],
+                           check=True, capture_output=True, text=True)
+    assert json.loads(apart.stdout) == records[7]
+    more = DrawnFrames(small[0], {**DOMAIN, "pose": {**DOMAIN["pose"], "time_s": 1}}, seed=7, count=20, size=(64, 48))
+    assert more.records[5]["gain_db"] == records[5]["gain_db"] and more.records[5]["time_s"] == 1
+    assert DrawnFrames(small[0], DOMAIN, seed=8, size=(64, 48)).records[5]["gain_db"] != records[5]["gain_db"]
+
+
+def test_draws_fill_their_ranges(small):
+    records = list(DrawnFrames(small[0], DOMAIN, seed=7, count=60, size=(16, 16)).records)
+    gains = np.array([r["gain_db"] for r in records])
+    # The outermost of 60 draws are further than a tenth from an end with 4 seeds in 1,000.
+    assert -6 <= gains.min() < -4.8 and 4.8 < gains.max() <= 6
+    # Four standard deviations of the mean of 60.
+    assert abs(gains.mean()) < 4 * 12 / np.sqrt(12 * 60)
+    assert {r["machine"]["looks"]["count"] for r in records} == {1, 2, 3}
+    assert {(r["machine"]["base"], r["probe"]["depth_mm"]) for r in records} == \
+        {(base, depth) for base in ("modern", "classic") for depth in (60, 90)}
+    assert all(a["machine"] == b["machine"] for a, b in zip(records[::2], records[1::2]))
+    assert 15 < sum(r["mannequin_from_needle"] is not None for r in records) < 45
+    assert all((r["mannequin_from_needle"] is None) == (r["dent_mm"] is None) for r in records)
+
+
+def test_what_is_drawn_reaches_the_picture(small):
+    """Each key by itself, from one end to the other; in the physical model, which has all of them."""
+    still = {"model": "physical", "chunk": 1, "pose": {"slide_mm": 0, "tilt_deg": 0, "rock_deg": 0, "rotate_deg": 0},
+             "needle": {"share": 1, "tip_depth_mm": 25}}
+
+    def drawn(change):
+        return DrawnFrames(small[0], {**still, **change}, count=1, size=(48, 48), planes=())[0]["image"]
+
+    standard = drawn({})
+    for change in ({"gain_db": 6}, {"machine": {"grey": {"exponent": 0.5}}}, {"machine": {"tissue_db": {"muscle": 4}}},
+                   {"machine": {"gain": {"tgc_db_per_cm_mhz": 0.9}}}, {"probe": {"frequency_mhz": 7}},
+                   {"probe": {"elevation_mm": 8}}, {"pose": {**still["pose"], "press_mm": 10}},
+                   {"pose": {**still["pose"], "tilt_deg": 20}}, {"needle": {**still["needle"], "share": 0}},
+                   {"needle": {**still["needle"], "tent_mm": 6}}):
+        assert (drawn(change) != standard).any(), change
+    # A machine's knob of contrast acts where its map is logarithmic.
+    narrow, wide = (drawn({"machine": {"grey": {"map": "log", "dynamic_range_db": v}}}) for v in (40, 80))
+    assert (narrow != wide).any()
+
+
+def test_drawn_frames_go_into_the_writers(small, tmp_path):
+    frames = DrawnFrames(small[0], DOMAIN, seed=7, count=4, size=(64, 48), facts=True)
+    write_zarr(frames, tmp_path / "a.zarr", 3)
+    write_webdataset(frames, tmp_path / "a-%02d.tar")
+    with pytest.raises(sonocase.Error, match="picture files"):
+        write_coco(frames, tmp_path / "a.json")
+    np.testing.assert_array_equal(read_zarr(tmp_path / "a.zarr", "image"), [f["image"] for f in frames])
+    records = list(map(json.loads, (tmp_path / "a.zarr" / "manifest.jsonl").read_text().splitlines()))
+    np.testing.assert_array_equal(picture(records[2]), frames[2]["image"])
+    assert records[2]["truth"]["contact"] > 0
+    with tarfile.open(tmp_path / "a-00.tar") as tar:
+        assert json.load(tar.extractfile("00000002.json")) == {**records[2], "classes": frames.classes}
+
+
+@pytest.mark.parametrize("change, words", [
+    ({"gain_db": [6, -6]}, "gain_db: .*reversed"), ({"gain_db": [0, 100]}, "gain_db: .*-60 to 60"),
+    ({"gain_db": [1, 2, 3]}, "gain_db: .*no range"), ({"gain_db": "loud"}, "gain_db: .*no number"),
+    ({"gain_db": [0, float("nan")]}, "gain_db: .*finite"), ({"gain": 3}, "gain: .*gain_db"),
+    ({"gain_db": {"one_of": []}}, "gain_db: .*empty"), ({"chunk": 0}, "chunk: 0"),
+    ({"pose": {"press_mm": [-1, 2]}}, "pose.press_mm: .*0 to 40"), ({"pose": {"tilt": 3}}, "pose.tilt: .*tilt_deg"),
+    ({"needle": {"share": 2}}, "needle.share: "), ({"needle": 3}, "needle: "),
+    ({"probe": {"depth_mm": [-5, 60]}}, "probe.depth_mm: "), ({"exercises": ["scam"]}, "scam"),
+    ({"machine": {"grey": {"level": [40, 400]}}}, "machine.grey.level is 400"),
+    ({"machine": {"grey": {"levle": 40}}}, "levle.*level"), ({"machine": "toaster"}, "toaster"),
+    ({"machine": {"looks": {"count": [1, 2.5]}}}, "machine.looks.count: .*whole"),
+    ({"machine": {"persistence": [[1], [2]]}}, "machine.persistence: "),
+    ({"machine": {"grey": {"level": None}}}, "machine.grey.level: null"),
+    ({"machine": {"tissue_db": {"vesel": 3}}}, "tissue_db.vesel: .*vessel"),
+    ({"machine": {"grey": {"dynamic_range_db": [40, 80]}}}, "dynamic_range_db: changes nothing"),
+    ({"machine": "classic", "model": "paper"}, "machine: changes nothing")])
+def test_a_bad_range_is_one_sentence_that_names_its_key(small, change, words):
+    with pytest.raises((ValueError, sonocase.Error), match=words) as raised:
+        DrawnFrames(small[0], {"model": "physical", **change})
+    assert "\n" not in str(raised.value)
+
+
 @pytest.mark.parametrize("arguments, words", [
     (["coco", "none", "-o", "x.json"], "dataset.json"), (["coco", "npy", "-o", "x.json"], "png"),
-    (["webdataset", "npy", "-o", "x.tar"], "number")])
+    (["webdataset", "npy", "-o", "x.tar"], "number"), (["zarr", "npy", "-o", "npy"], "there already"),
+    (["zarr", "npy", "-o", "x.zarr", "--split", "validate"], "no frames"),
+    (["zarr", "npy", "-o", "x.zarr", "--frames-per-chunk", "0"], "frames_per_chunk")])
 def test_what_cannot_be_done_is_one_line(made, tmp_path, capsys, monkeypatch, arguments, words):
     monkeypatch.chdir(made)
     assert main(arguments) == 1

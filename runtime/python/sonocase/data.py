@@ -10,6 +10,7 @@ A DataSet has len() and [i], which is all that torch asks of a data set; torch i
 
     python3 -m sonocase.data coco abdomen -o abdomen.json
     python3 -m sonocase.data webdataset abdomen -o shards/abdomen-%06d.tar
+    python3 -m sonocase.data zarr abdomen -o abdomen.zarr
 """
 
 import argparse
@@ -17,8 +18,10 @@ import io
 import json
 import pathlib
 import re
+import shutil
 import sys
 import tarfile
+import zlib
 
 import numpy as np
 
@@ -34,6 +37,20 @@ def _read(path):
     if not path.exists():
         raise Error(f"no such file: {path}: run sonoplay dataset again, it goes on where it stopped")
     return path
+
+
+def common_classes(palettes, classes=None):
+    """Classes of several cases, and by case an array from its own label to its class.
+
+    palettes   by case, the names of its labels, "outside" first
+    classes    names; by default all of them, "outside" first, the rest by the alphabet
+    """
+    if classes is None:
+        classes = ["outside", *sorted({n for palette in palettes.values() for n in palette[1:]})]
+    index = {name: i for i, name in enumerate(classes)}
+    kind = np.uint8 if len(classes) <= 256 else np.uint16
+    return list(classes), {case: np.array([index.get(n, 0) for n in palette], kind)
+                           for case, palette in palettes.items()}
 
 
 class DataSet:
@@ -61,12 +78,7 @@ class DataSet:
         self.facts = facts
         palettes = {c["bundle"]: [l["name"] for l in c["labels"]]
                     for c in self.description["cases"]}
-        names = sorted({n for palette in palettes.values() for n in palette[1:]})
-        self.classes = ["outside", *names] if classes is None else list(classes)
-        index = {name: i for i, name in enumerate(self.classes)}
-        kind = np.uint8 if len(self.classes) <= 256 else np.uint16
-        self._class_of = {bundle: np.array([index.get(n, 0) for n in palette], kind)
-                          for bundle, palette in palettes.items()}
+        self.classes, self._class_of = common_classes(palettes, classes)
         self._arrays = {}
 
     def __len__(self):
@@ -118,7 +130,8 @@ def write_coco(data, path):
     Masks are run lengths (pycocotools reads them); file names are relative to the data set's folder.
     """
     if data.records and "image" not in data.records[0]:
-        raise Error(f"{data.folder}: COCO names picture files: ask for format = \"png\"")
+        where = getattr(data, "folder", "frames that are drawn")
+        raise Error(f"{where}: COCO names picture files: ask sonoplay dataset for format = \"png\"")
     categories = [{"id": i, "name": n} for i, n in enumerate(data.classes) if i > 0]
     needle = len(data.classes)
     categories.append({"id": needle, "name": "needle"})
@@ -167,7 +180,8 @@ def write_webdataset(data, pattern, frames_per_shard=1000):
         partial = path.with_name(path.name + ".part")
         with tarfile.open(partial, "w", format=tarfile.USTAR_FORMAT) as tar:
             for i in range(first, min(first + frames_per_shard, len(data))):
-                record, frame = data.records[i], data[i]
+                frame = data[i]
+                record = frame.get("facts") or data.records[i]
                 key = f"{record['index']:08d}"
                 for plane in data.planes:
                     content = io.BytesIO()
@@ -178,19 +192,84 @@ def write_webdataset(data, pattern, frames_per_shard=1000):
         partial.replace(path)
 
 
+def write_zarr(data, path, frames_per_chunk=16, compress=True):
+    """Writes a group in Zarr's version 2: an array (frame, row, column) per plane, and `index`.
+
+    path       of the folder, which must not be there yet; the same data give the same bytes
+    compress   zlib, which every reader of Zarr has; False: plain values, to be mapped
+
+    `classes` is among the group's attributes; manifest.jsonl beside the arrays has the records.
+    """
+    path = pathlib.Path(path)
+    if path.exists():
+        raise Error(f"{path}: is there already: remove it, or give another name")
+    if not len(data):
+        raise Error(f"{path}: no frames to write: the data set or the split is empty")
+    if frames_per_chunk < 1:
+        raise ValueError(f"frames_per_chunk: {frames_per_chunk} is out of range: give 1 or more")
+    partial = path.with_name(path.name + ".part")
+    if partial.exists():  # of a run that was stopped
+        shutil.rmtree(partial)
+    partial.mkdir(parents=True)
+    about = {".zgroup": {"zarr_format": 2}, ".zattrs": {"classes": data.classes}}
+
+    def describe(name, first, fill, dimensions):
+        about[f"{name}/.zarray"] = {
+            "zarr_format": 2, "shape": [len(data), *first.shape],
+            "chunks": [frames_per_chunk, *first.shape], "dtype": first.dtype.str, "order": "C",
+            "compressor": {"id": "zlib", "level": 6} if compress else None,
+            "fill_value": fill, "filters": None}
+        about[f"{name}/.zattrs"] = {"_ARRAY_DIMENSIONS": dimensions}  # as xarray reads them
+        (partial / name).mkdir()
+
+    def write(name, number, rows, fill):
+        whole = np.full((frames_per_chunk, *rows[0].shape), fill, rows[0].dtype)
+        whole[:len(rows)] = rows  # the last chunk is as large as the others
+        content = whole.tobytes()
+        chunk = ".".join([str(number), *["0"] * (whole.ndim - 1)])
+        (partial / name / chunk).write_bytes(zlib.compress(content, 6) if compress else content)
+
+    with open(partial / "manifest.jsonl", "w", encoding="utf-8") as manifest:
+        for number, first in enumerate(range(0, len(data), frames_per_chunk)):
+            planes, indices = {plane: [] for plane in data.planes}, []
+            for i in range(first, min(first + frames_per_chunk, len(data))):
+                frame = data[i]
+                record = frame.get("facts") or data.records[i]
+                manifest.write(json.dumps(record) + "\n")
+                indices.append(np.array(record["index"], "<i8"))
+                for plane in data.planes:
+                    values = frame[plane]
+                    planes[plane].append(values.astype(values.dtype.newbyteorder("<"), copy=False))
+            for name, rows in [*planes.items(), ("index", indices)]:
+                real = rows[0].dtype.kind == "f"
+                if number == 0:
+                    describe(name, rows[0], "NaN" if real else 0,
+                             ["frame", "row", "column"][:rows[0].ndim + 1])
+                write(name, number, rows, np.nan if real else 0)
+    about[".zmetadata"] = {"zarr_consolidated_format": 1, "metadata": dict(about)}
+    for name, content in about.items():
+        (partial / name).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    partial.replace(path)
+
+
 def main(arguments=None):
     parser = argparse.ArgumentParser(prog="python3 -m sonocase.data", description=__doc__.split("\n")[0])
-    parser.add_argument("form", choices=["coco", "webdataset"])
+    parser.add_argument("form", choices=["coco", "webdataset", "zarr"])
     parser.add_argument("folder", help="that sonoplay dataset wrote")
     parser.add_argument("-o", "--out", required=True,
-                        help="coco: a .json file; webdataset: shards, as in abdomen-%%06d.tar")
+                        help="coco: a .json file; webdataset: shards, as in abdomen-%%06d.tar; "
+                             "zarr: a new folder")
     parser.add_argument("--split", choices=["train", "validate", "test"])
     parser.add_argument("--frames-per-shard", type=int, default=1000)
+    parser.add_argument("--frames-per-chunk", type=int, default=16, help="zarr")
+    parser.add_argument("--plain", action="store_true", help="zarr: chunks without compression")
     chosen = parser.parse_args(arguments)
     try:
         data = DataSet(chosen.folder, chosen.split, tuple(p for p in _PLANES if p != "image"))
         if chosen.form == "coco":
             write_coco(data, chosen.out)
+        elif chosen.form == "zarr":
+            write_zarr(data, chosen.out, chosen.frames_per_chunk, not chosen.plain)
         else:
             write_webdataset(data, chosen.out, max(1, chosen.frames_per_shard))
     except (Error, ValueError, OSError, TypeError) as error:

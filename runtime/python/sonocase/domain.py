@@ -1,0 +1,431 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames of drawn machines, probes, poses and needles: domain randomisation as data, with its seed.
+
+    from sonocase.domain import DrawnFrames
+    frames = DrawnFrames("demo.sonocase", {
+        "gain_db": [-6, 6],                                  # a range
+        "machine": {"base": ["modern", "classic"],           # one of these names
+                    "grey": {"level": [40, 70]}, "tissue_db": {"liver": [-3, 3]}},
+        "probe": {"depth_mm": {"one_of": [120, 160]}},       # one of these numbers
+        "needle": {"share": 0.5, "tip_depth_mm": [20, 80]}}, seed=7, count=1000)
+    frame = frames[0]               # as of a DataSet: "image", "labels", "needle", ...
+    frames.records[0]               # everything that was drawn, fit for JSON
+    picture(frames.records[0])      # the same picture, of its record alone
+
+A value is drawn from the seed, the number of the sample (or of its chunk) and the value's key alone:
+the same in any order and process, and unmoved by other keys that come or go.
+"""
+
+import difflib
+import hashlib
+import json
+import math
+import os
+import pathlib
+import re
+import tempfile
+
+import numpy as np
+
+from . import pose as _pose
+from ._core import Case, Error, Probe, Renderer
+from .data import common_classes
+
+# Keys of a probe with their limits.
+PROBE = {"shape": None, "radius_mm": (1, 1000), "field_of_view_rad": (0.01, 6), "width_mm": (1, 1000),
+         "depth_mm": (1, 1000), "frequency_mhz": (0.5, 50), "focus_mm": (0, 1000),
+         "elevation_mm": (0, 100)}
+PLANES = ("labels", "needle", "shadowed", "skin_depth_mm")
+
+# What a sample draws beside machine and probe: standard, and limits.
+_SAMPLE = {
+    "gain_db": (0.0, -60, 60),
+    "pose.slide_mm": ([-15, 15], -500, 500),   # along the face and across it, one draw each
+    "pose.tilt_deg": ([-15, 15], -90, 90),
+    "pose.rock_deg": ([-10, 10], -90, 90),
+    "pose.rotate_deg": ([-20, 20], -180, 180),
+    "pose.press_mm": (0.0, 0, 40),
+    "pose.time_s": ([0, 8], 0, 1e6),
+    "needle.share": (0.0, 0, 1),
+    "needle.tip_depth_mm": ([20, 80], 0, 500),
+    "needle.tip_across_mm": ([-10, 10], -200, 200),
+    "needle.angle_deg": ([25, 65], 0, 90),     # between shaft and beam
+    "needle.off_plane_mm": ([-2, 2], -100, 100),
+    "needle.tent_mm": (0.0, 0, 50),
+    "needle.drag_mm": (0.0, 0, 50),
+}
+_TABLES = ("machine", "probe", "pose", "needle")
+_OTHERS = ("chunk", "exercises", "model")
+# The machine's reader takes these as whole numbers alone.
+_WHOLE = ("machine.looks.count", "machine.looks.near_count", "machine.beam.lines",
+          "machine.near_field.lines")
+
+
+def _is_number(value):
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+class _Choice:
+    """A value, a range or a list to choose from, under its key."""
+
+    def __init__(self, key, given, limits=None):
+        self.key, self.low, self.high, self.options = key, None, None, None
+        if isinstance(given, dict):
+            if set(given) != {"one_of"}:
+                raise ValueError(f"{key}: expected a value, [lowest, highest] or {{\"one_of\": [...]}}")
+            self.options = given["one_of"]
+            if not isinstance(self.options, (list, tuple)) or not self.options:
+                raise ValueError(f"{key}: one_of is empty or no list: give at least one value")
+            self.options = list(self.options)
+        elif isinstance(given, (list, tuple)):
+            if given and all(isinstance(v, str) for v in given):
+                self.options = list(given)
+            elif len(given) == 2 and all(map(_is_number, given)):
+                self.low, self.high = given
+            else:
+                raise ValueError(f"{key}: {given!r} is no range: expected [lowest, highest], both numbers")
+        else:
+            self.options = [given]
+        for value in self.options or (self.low, self.high):
+            if value is None:
+                raise ValueError(f"{key}: null is no value: leave the key out")
+            if limits is not None and not _is_number(value):
+                raise ValueError(f"{key}: {value!r} is no number")
+            if _is_number(value) and not math.isfinite(value):
+                raise ValueError(f"{key}: {value} is not finite")
+            if limits is not None and not limits[0] <= value <= limits[1]:
+                raise ValueError(f"{key}: {value} is out of range: give {limits[0]} to {limits[1]}")
+        if self.options is None:
+            if self.low > self.high:
+                raise ValueError(f"{key}: the range {[*given]} is reversed: give its lower end first")
+            if key in _WHOLE and not all(isinstance(v, int) for v in given):
+                raise ValueError(f"{key}: the range {[*given]} is of whole numbers alone")
+
+    def draw(self, seed, number, part=""):
+        # Not NumPy's generators, whose streams may change from version to version.
+        text = f"{seed}/{number}/{self.key}{part}"
+        bits = int.from_bytes(hashlib.blake2b(text.encode(), digest_size=8).digest(), "big") >> 11
+        share = bits / 2**53
+        if self.options is not None:
+            return self.options[int(share * len(self.options))]
+        if self.key in _WHOLE:
+            return self.low + int(share * (self.high - self.low + 1))
+        return min(self.low + share * (self.high - self.low), float(self.high))
+
+    def corner(self, n):
+        """Its n-th extreme value, so that all limits can be tried."""
+        if self.options is not None:
+            return self.options[min(n, len(self.options) - 1)]
+        return self.high if n else self.low
+
+
+def _leaves(table, key):
+    if not isinstance(table, dict):
+        raise ValueError(f"{key}: expected a table of keys")
+    for name, value in table.items():
+        if isinstance(value, dict) and set(value) != {"one_of"}:
+            yield from _leaves(value, f"{key}.{name}")
+        else:
+            yield f"{key}.{name}", (key, name), value
+
+
+def _refuse_unknown(key, known):
+    if key not in known:
+        near = difflib.get_close_matches(key, known, 1, 0.5)
+        raise ValueError(f"{key}: no such key" + (f": did you mean {near[0]}?" if near else ""))
+
+
+class Domain:
+    """What is drawn and from which ranges: a checked description, a plain dict as JSON or TOML give it.
+
+    chunk       samples that share case, exercise, model, machine and probe, whose change costs as
+                much as several frames; 16 by default
+    exercises   names; by default all of the case
+    model       "physical" or "paper"; by default the exercise's
+    machine     names or paths, or a table: base and any key of a machine (formats/machine)
+    probe       keys of sonocase.Probe, in place of the exercise's
+    pose        slide_mm, tilt_deg, rock_deg, rotate_deg, press_mm, time_s
+    needle      share, tip_depth_mm, tip_across_mm, angle_deg, off_plane_mm, tent_mm, drag_mm
+    gain_db
+
+    Each but chunk is a value, [lowest, highest] or {"one_of": [...]}; a list of words is a choice.
+    """
+
+    def __init__(self, description):
+        if not isinstance(description, dict):
+            raise ValueError("description: expected a dict")
+        for key in description:
+            _refuse_unknown(key, [*_OTHERS, *_TABLES, "gain_db"])
+        self.description = json.loads(json.dumps(description))
+        self.chunk = description.get("chunk", 16)
+        if not isinstance(self.chunk, int) or isinstance(self.chunk, bool) or self.chunk < 1:
+            raise ValueError(f"chunk: {self.chunk!r} is no whole number from 1 on")
+        given = {"gain_db": description["gain_db"]} if "gain_db" in description else {}
+        for table in ("pose", "needle"):
+            given.update({key: value for key, _, value in _leaves(description.get(table, {}), table)})
+        for key in given:
+            _refuse_unknown(key, list(_SAMPLE))
+        self.sample = {key: _Choice(key, given.get(key, standard), limits)
+                       for key, (standard, *limits) in _SAMPLE.items()}
+        self.dents = "needle.tent_mm" in given or "needle.drag_mm" in given
+        self.exercises = self._words("exercises")
+        self.model = self._words("model")
+        self.probe = {}
+        for key, (_, name), value in _leaves(description.get("probe", {}), "probe"):
+            _refuse_unknown(key, [f"probe.{k}" for k in PROBE])
+            self.probe[name] = _Choice(key, value, PROBE[name])
+        machine = description.get("machine", "")
+        keyed = isinstance(machine, dict) and set(machine) != {"one_of"}
+        self.machine_name = None if keyed else self._words("machine", "")
+        self.machine = [(path, _Choice(key, value))
+                        for key, path, value in _leaves(machine, "machine")] if keyed else []
+
+    def _words(self, key, standard=None):
+        if key not in self.description and standard is None:
+            return None
+        choice = _Choice(key, self.description.get(key, standard))
+        for word in choice.options or (choice.low,):
+            if not isinstance(word, str):
+                raise ValueError(f"{key}: {word!r} is no name")
+        return choice
+
+    def machine_of(self, value):
+        """A name, or a table of a machine's keys, each by value(choice)."""
+        if self.machine_name is not None:
+            return value(self.machine_name)
+        machine = {}
+        for (table, name), choice in self.machine:
+            place = machine
+            for part in table.split(".")[1:]:
+                place = place.setdefault(part, {})
+            place[name] = value(choice)
+        return machine
+
+    def corners(self):
+        """(machine, probe) at the ends of all ranges and with each choice."""
+        choices = [*self.probe.values(), *(c for _, c in self.machine), self.machine_name]
+        longest = max((2 if c.options is None else len(c.options) for c in choices if c), default=1)
+        for n in range(longest):
+            yield (self.machine_of(lambda c: c.corner(n)),
+                   {name: c.corner(n) for name, c in self.probe.items()})
+
+
+def _toml(table, name):
+    def value(v):
+        if isinstance(v, bool):
+            return "true" if v else "false"
+        if isinstance(v, (list, tuple)):
+            return "[" + ", ".join(map(value, v)) + "]"
+        return json.dumps(v, ensure_ascii=False)
+
+    quoted = {k: json.dumps(k, ensure_ascii=False) for k in table}
+    lines = [f"[{name}]"] + [f"{quoted[k]} = {value(v)}" for k, v in table.items()
+                             if not isinstance(v, dict)]
+    for k, v in table.items():
+        if isinstance(v, dict):
+            lines += _toml(v, f"{name}.{quoted[k]}")
+    return lines
+
+
+def _renderer(case, exercise, model, machine, probe, size, seed):
+    options = {"model": model, "size": tuple(size), "seed": seed}
+    exercise = case.exercise(exercise)
+    changed = exercise.probe
+    for name, value in probe.items():
+        setattr(changed, name, value)
+    if not isinstance(machine, dict):
+        return Renderer(case, exercise, changed, machine=machine, **options)
+    with tempfile.TemporaryDirectory() as folder:  # a machine is given by name or as a file
+        path = os.path.join(folder, "machine.toml")
+        pathlib.Path(path).write_text("\n".join(_toml(machine, "machine")) + "\n", "utf-8")
+        try:
+            return Renderer(case, exercise, changed, machine=path, **options)
+        except Error as error:
+            said = re.sub(re.escape(path) + r"(:\d+)?:? *", "", str(error))
+            raise ValueError(said) from None
+
+
+def renderer_of(record, case=None):
+    """The renderer that drew a record's picture; `case` instead of opening the one that it names."""
+    case = case or Case.open(record["case"])
+    return _renderer(case, record["exercise"], record["model"], record["machine"], record["probe"],
+                     record["size"], record["seed"])
+
+
+def picture(record, renderer=None):
+    """The picture of a record, as it was; `renderer` of the same chunk, to make many."""
+    return (renderer or renderer_of(record)).render(
+        record["mannequin_from_probe"], record["mannequin_from_needle"], record["time_s"],
+        frame=record["noise_frame"], gain_db=record["gain_db"], press_mm=record["press_mm"],
+        dent=record["dent_mm"])
+
+
+def _plain(value):
+    """As JSON has it: lists for arrays, null for what is not a number."""
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+class _Records:
+    def __init__(self, frames):
+        self._frames = frames
+
+    def __len__(self):
+        return len(self._frames)
+
+    def __getitem__(self, i):
+        return self._frames._record(range(len(self))[i])
+
+    def __iter__(self):
+        return (self[i] for i in range(len(self)))
+
+
+class DrawnFrames:
+    """Frames that are rendered when they are asked for, in the form of a DataSet: len(), [i], classes, planes, records.
+
+    cases         path of a bundle, or several, of which each chunk draws one
+    description   a dict or a Domain
+    seed          of all that is drawn, and of the noise
+    count         of samples; a greater one gives the same frames and more
+    planes        what a frame holds beside "image"
+    facts         also "facts": the record, with the frame's truth
+    classes       as of a DataSet
+
+    The writers of sonocase.data take it in place of a DataSet; loaders' workers get it by pickling.
+    """
+
+    def __init__(self, cases, description, seed=1, count=1000, *, size=(256, 256),
+                 planes=("labels", "needle"), facts=False, classes=None):
+        self.domain = description if isinstance(description, Domain) else Domain(description)
+        self.seed, self.count, self.size, self.facts = int(seed), int(count), tuple(size), facts
+        if not 0 <= self.seed < 2**32:
+            raise ValueError(f"seed: {seed} is out of range: give 0 to 2^32 - 1")
+        if self.count < 1:
+            raise ValueError(f"count: {count} is out of range: give 1 or more")
+        for plane in planes:
+            if plane not in PLANES and plane != "image":
+                raise ValueError(f"unknown plane '{plane}': expected some of {', '.join(PLANES)}")
+        self.planes = ("image", *[p for p in planes if p != "image"])
+        paths = [cases] if isinstance(cases, (str, os.PathLike)) else cases
+        self._case = _Choice("case", {"one_of": [os.fspath(p) for p in paths]})
+        self._clear()
+        opened = {path: self._opened(path) for path in self._case.options}
+        self.classes, self._class_of = common_classes(
+            {path: [l.name for l in case.labels] for path, case in opened.items()}, classes)
+        self._refuse_what_does_nothing(opened.values())
+        for case in opened.values():  # each end of each range: the machine's reader says its limits
+            for exercise in self._exercises(case).options:
+                for machine, probe in self.domain.corners():
+                    # The model that begins fastest: machines and probes are checked alike by both.
+                    _renderer(case, exercise, "paper", machine, probe, (16, 16), 1)
+
+    def _exercises(self, case):
+        return self.domain.exercises or _Choice("exercises", [e.name for e in case.exercises])
+
+    def _refuse_what_does_nothing(self, cases):
+        machine = {choice.key: choice for _, choice in self.domain.machine}
+        models = set(self.domain.model.options) if self.domain.model else \
+            {case.exercise(name).model for case in cases for name in self._exercises(case).options}
+        if "machine" in self.domain.description and models == {"paper"}:
+            raise ValueError("machine: changes nothing in the model paper: give model = \"physical\"")
+        labels = [f"machine.tissue_db.{label.name}" for case in cases for label in case.labels]
+        for key in machine:
+            if key.startswith("machine.tissue_db."):
+                _refuse_unknown(key, labels)
+        # Of the built-in machines, classic alone maps echoes to grey by a logarithm.
+        key, of_map, of_base = (f"machine.{k}" for k in ("grey.dynamic_range_db", "grey.map", "base"))
+        logarithmic = "log" in machine[of_map].options if of_map in machine else \
+            of_base in machine and "classic" in machine[of_base].options
+        if key in machine and not logarithmic:
+            raise ValueError(f"{key}: changes nothing where grey.map is power: give grey.map = \"log\" "
+                             "or base = \"classic\", or draw grey.exponent")
+
+    def _clear(self):
+        self._cases, self._last = {}, (None, None)
+        self.records = _Records(self)
+
+    def __getstate__(self):  # workers open their own cases
+        return {k: v for k, v in self.__dict__.items() if k not in ("_cases", "_last", "records")}
+
+    def __setstate__(self, state):
+        self.__dict__.update(state)
+        self._clear()
+
+    def __len__(self):
+        return self.count
+
+    def __iter__(self):
+        return map(self.__getitem__, range(len(self)))
+
+    def _opened(self, path):
+        if path not in self._cases:
+            self._cases[path] = Case.open(path)
+        return self._cases[path]
+
+    def _chunk(self, i):
+        """What all of a chunk have in common, and its renderer."""
+        number = i // self.domain.chunk
+        if self._last[0] == number:
+            return self._last[1]
+        draw = lambda choice: choice.draw(self.seed, number)  # noqa: E731
+        path = draw(self._case)
+        case = self._opened(path)
+        exercise = case.exercise(draw(self._exercises(case)))
+        probe = {name: getattr(exercise.probe, name) for name in PROBE}
+        probe.update({name: draw(c) for name, c in self.domain.probe.items()})
+        common = {"chunk": number, "case": path, "exercise": exercise.name,
+                  "model": draw(self.domain.model) if self.domain.model else exercise.model,
+                  "machine": self.domain.machine_of(draw), "probe": probe, "size": list(self.size),
+                  "seed": self.seed}
+        renderer = renderer_of(common, case)
+        common.update(mm_per_px=renderer.mm_per_px, origin_px=list(renderer.origin_px))
+        self._last = (number, (common, renderer))
+        return self._last[1]
+
+    def _record(self, i):
+        common, renderer = self._chunk(i)
+        case, exercise = self._opened(common["case"]), renderer.exercise
+        drawn = {key: c.draw(self.seed, i) for key, c in self.domain.sample.items()}
+        slide = np.array([self.domain.sample["pose.slide_mm"].draw(self.seed, i, f".{a}") for a in "xy"])
+        stands = [exercise.start_pose, *(p for name in exercise.sweeps for p in exercise.sweep_poses(name))]
+        stand = _Choice("stand", {"one_of": stands}).draw(self.seed, i)
+        for part in (1, 0.5, 0):  # off the body: nearer to where the exercise stands
+            near = stand[:3, 3] + stand[:3, :2] @ (part * slide)
+            pose = _pose.on_skin(case, near, stand[:3, 2], stand[:3, 0])
+            if pose is not None:
+                break
+        else:
+            raise Error(f"{common['case']}: exercise {exercise.name}: no skin where it stands")
+        pose = _pose.turned(pose, *np.radians([drawn["pose.tilt_deg"], drawn["pose.rock_deg"],
+                                               drawn["pose.rotate_deg"]]))
+        needle = dent = None
+        if _Choice("needle.is", [0, 1]).draw(self.seed, i) < drawn["needle.share"]:
+            angle = math.radians(drawn["needle.angle_deg"])
+            side = _Choice("needle.side", {"one_of": [-1, 1]}).draw(self.seed, i)
+            tip = pose @ [drawn["needle.tip_across_mm"], drawn["needle.off_plane_mm"],
+                          drawn["needle.tip_depth_mm"], 1]
+            axis = pose[:3, :3] @ [side * math.sin(angle), 0, math.cos(angle)]
+            needle = _pose.looking(tip[:3], axis, -pose[:3, 2])  # the bevel faces the probe
+            if self.domain.dents:
+                dent = [drawn["needle.tent_mm"], drawn["needle.drag_mm"]]
+        return _plain({"index": i, **common, "noise_frame": i, "time_s": drawn["pose.time_s"],
+                       "gain_db": drawn["gain_db"], "press_mm": drawn["pose.press_mm"],
+                       "mannequin_from_probe": pose, "mannequin_from_needle": needle, "dent_mm": dent})
+
+    def __getitem__(self, i):
+        record = self.records[i]
+        renderer = self._chunk(record["index"])[1]
+        frame = {"image": picture(record, renderer)}
+        if len(self.planes) > 1 or self.facts:
+            planes, facts = renderer.truth(self.planes[1:])
+            frame.update({plane: getattr(planes, plane) for plane in self.planes[1:]})
+            if "labels" in frame:
+                frame["labels"] = self._class_of[record["case"]][frame["labels"]]
+            if self.facts:
+                frame["facts"] = {**record, "truth": _plain(facts)}
+        return frame
