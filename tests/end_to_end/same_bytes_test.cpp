@@ -34,7 +34,7 @@ constexpr const char* kSlender = "08e665aa2bf6f95bef4295beeee8131d";
 constexpr const char* kReal = "1d753d2be3b305eb98cfea61f3be90e4";
 constexpr const char* kDraftPhysical = "92c2c98940ad9cc88398e01efd9e8b5f";
 constexpr const char* kDraftPaper = "1aaccd9bf66881ec2231c9c0ceb219e6";
-constexpr const char* kRealPhysical = "867c86f63d8168a259b977c61f2c01c8";
+constexpr const char* kRealPhysical = "b245683e2412597e683dbc7901cae19e";
 constexpr const char* kRealPaper = "238bbc50256594eac66fdcb76d826e84";
 
 class SameBytes : public ::testing::Test {
