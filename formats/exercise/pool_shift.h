@@ -23,11 +23,11 @@ namespace sonocase {
 
 inline constexpr double kPoolCore = 0.4;                         // k
 inline constexpr double kPoolFadesFrom = 2.5, kPoolReaches = 4;  // in radii
-inline constexpr double kLeastPoolMm = 0.4;                      // a smaller pool is none
+inline constexpr double kMinPoolMm = 0.4;                        // a smaller pool is none
 
 // rho / r. The same bits everywhere: sums, products and quotients alone.
 inline double pool_share(double r_mm, double radius_mm) {
-    if (!(radius_mm >= kLeastPoolMm)) return 1;
+    if (!(radius_mm >= kMinPoolMm)) return 1;
     const double radii = r_mm / radius_mm;
     if (!(radii < kPoolReaches)) return 1;
     if (radii <= 1) return kPoolCore;
@@ -48,7 +48,7 @@ inline Point3 before_pools(std::span<const SceneChange::Pool> pools, Point3 p) {
     for (const SceneChange::Pool& pool : pools) {
         const Vector3 away = p - pool.centre;
         const double r_mm = norm(away);
-        const bool within = r_mm <= pool.radius_mm && pool.radius_mm >= kLeastPoolMm;
+        const bool within = r_mm <= pool.radius_mm && pool.radius_mm >= kMinPoolMm;
         p = pool.centre + (within ? 0 : pool_share(r_mm, pool.radius_mm)) * away;
     }
     return p;

@@ -85,7 +85,7 @@ class PressField {
     void dent(const NeedleDent& needle) { dent_ = needle; }
     const NeedleDent& needle() const { return dent_; }
     // Adds pools that push tissue aside (formats/exercise/pool_shift.h), in the frame of the pose
-    // where bone holds the face, as the probe leaves them at rest; all of at least kLeastPoolMm, at
+    // where bone holds the face, as the probe leaves them at rest; all of at least kMinPoolMm, at
     // most SceneChange::kMaxPools. Pictures show what they move in the plane; pull_back and
     // push_forward leave them out.
     void set_pools(std::span<const SceneChange::Pool> pools);

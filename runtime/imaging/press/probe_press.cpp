@@ -84,7 +84,7 @@ void ProbePress::set_pools(std::span<const SceneChange::Pool> pools) {
     std::size_t count = 0;
     for (SceneChange::Pool pool : pools.first(std::min(pools.size(), seen.size()))) {
         pool.centre = from_mannequin_ * pool.centre;
-        if (!(pool.radius_mm >= kLeastPoolMm) || !std::isfinite(norm(pool.centre - Point3{})))
+        if (!(pool.radius_mm >= kMinPoolMm) || !std::isfinite(norm(pool.centre - Point3{})))
             continue;
         pool.centre.z += field_.state().excess_mm;  // from the face where bone holds it
         seen[count++] = pool;

@@ -45,7 +45,7 @@ TEST(PoolShift, WhatIsNoPoolMovesNothing) {
     EXPECT_EQ(pool_share(1, -3), 1);
     EXPECT_EQ(pool_share(0, NAN), 1);
     EXPECT_EQ(pool_share(NAN, 3), 1);
-    EXPECT_EQ(pool_share(0.1, 0.9 * kLeastPoolMm), 1);
+    EXPECT_EQ(pool_share(0.1, 0.9 * kMinPoolMm), 1);
     const std::array<SceneChange::Pool, 1> pools{{{{1, 2, 3}, 5, false}}};
     EXPECT_EQ(before_pools({}, {9, 9, 9}), (Point3{9, 9, 9}));
     EXPECT_EQ(before_pools(pools, {1, 2, 3}), (Point3{1, 2, 3}));  // where it was injected

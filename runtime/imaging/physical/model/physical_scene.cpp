@@ -336,7 +336,6 @@ void balls_of_frame(const PhysicalScene& scene,
                     int first_target,
                     const Matrix3* pushed_axes,
                     std::vector<TargetBall>& balls) {
-    constexpr double kSmallestMm = kLeastPoolMm;  // what is smaller is gone
     balls.clear();
     if (scene.free_fluid && change.has_level) {  // everything else lies in it
         balls.push_back(*scene.free_fluid);
@@ -350,12 +349,12 @@ void balls_of_frame(const PhysicalScene& scene,
             ball.radius_mm *= scale;
             ball.reach_mm *= scale;
         }
-        if (ball.radius_mm >= kSmallestMm) balls.push_back(ball);
+        if (ball.radius_mm >= kMinPoolMm) balls.push_back(ball);
     }
     if (scene.wire < 0) return;
     for (int i = 0; i < change.pool_count; ++i) {
         const SceneChange::Pool& pool = change.pools[static_cast<std::size_t>(i)];
-        if (pool.radius_mm < kSmallestMm) continue;
+        if (pool.radius_mm < kMinPoolMm) continue;
         TargetBall ball;
         ball.centre_vx = scene.grid.voxel_from_point(pool.centre);
         ball.radius_mm = ball.reach_mm = pool.radius_mm;
