@@ -275,7 +275,15 @@ std::vector<ExerciseTexts> read_texts(const TomlTable& table, const Exercise* ex
     return all;
 }
 
-void read_free_fluid(const TomlTable& table, FreeFluid& fluid) {
+FreeFluid read_free_fluid(const TomlTable& table, bool named) {
+    FreeFluid fluid;
+    if (named) {
+        fluid.name.clear();
+        table.text("name", fluid.name);
+        if (fluid.name.empty())
+            table.add_fault("name", "is missing or empty", "expected where it lies");
+        table.number("chance", fluid.chance, 0, 1, true);
+    }
     if (!table.number("ml", fluid.ml, 1, 20000) && !table.has("ml"))
         table.add_fault("ml", "is missing", "expected a volume, as in ml = 2000");
     table.number("ml_spread", fluid.ml_spread, 0, 0.9);
@@ -300,6 +308,29 @@ void read_free_fluid(const TomlTable& table, FreeFluid& fluid) {
     if (std::abs(dot(fluid.up, fluid.head)) > 0.7)
         table.add_fault("head", "points almost along up", "expected it along the spine");
     table.finish();
+    return fluid;
+}
+
+// [free_fluid], or [[free_fluid]] for several that have names.
+void read_free_fluids(const TomlTable& root, std::vector<FreeFluid>& fluids) {
+    if (!root.has("free_fluid")) return;
+    if (root.plain_value("free_fluid") == "(a table)") {
+        if (auto table = root.table("free_fluid")) fluids = {read_free_fluid(*table, false)};
+        return;
+    }
+    for (const TomlTable& table : root.tables("free_fluid")) {
+        FreeFluid fluid = read_free_fluid(table, true);
+        for (const FreeFluid& before : fluids)
+            if (before.name == fluid.name)
+                table.add_fault("name", "'" + fluid.name + "' is there twice",
+                                "expected a name of its own");
+        fluids.push_back(std::move(fluid));
+    }
+    if (fluids.size() > SceneChange::kMaxFluids) {
+        root.add_fault("free_fluid", "is there " + std::to_string(fluids.size()) + " times",
+                       "expected at most " + std::to_string(SceneChange::kMaxFluids));
+        fluids.resize(SceneChange::kMaxFluids);
+    }
 }
 
 Exercise read_exercise(const TomlTable& root) {
@@ -350,10 +381,10 @@ Exercise read_exercise(const TomlTable& root) {
         table->number("vein_swell_mm", d.vein_swell_mm, 0, 2);
         table->finish();
     }
-    if (auto table = root.table("free_fluid")) read_free_fluid(*table, e.free_fluid);
+    read_free_fluids(root, e.free_fluids);
     for (const TomlTable& table : root.tables("pass_marks")) read_pass_mark(table, e.pass_marks);
     e.procedure = read_procedure(root, e);
-    if (e.free_fluid.ml > 0 && !e.procedure.given())
+    if (!e.free_fluids.empty() && !e.procedure.given())
         root.add_fault("free_fluid", "stands alone",
                        "expected [[steps]] or [[items]], which say what to do about it");
     if (auto table = root.table("texts")) read_texts(*table, &e);

@@ -128,20 +128,21 @@ struct Deformation {
     double vein_level_mm = 0, vein_swell_mm = 0;
 };
 
-// Free fluid in the abdomen, which lies lowest. It takes the place of one tissue, that between the
-// bowels, within an ellipsoid and below a level; volume and posture say where the level is
-// (formats/scoring/free_fluid.h). Organs and bowel stay where they are.
+// Free fluid in a space of the abdomen, where it lies lowest. It takes the place of one tissue, that
+// between the organs, within an ellipsoid and below a level; volume and posture say where the level
+// is (formats/scoring/free_fluid.h). Organs and bowel stay where they are.
 struct FreeFluid {
-    double ml = 0;         // 0: none
-    double ml_spread = 0;  // an attempt draws the volume from (1 -+ this) times ml
-    bool blood = false;    // fresh blood, with echoes; otherwise clear
-    std::string lies_in;   // label
-    Point3 centre;         // `mannequin` frame
-    Vector3 half_mm;       // of the ellipsoid: across, front to back, head to foot
+    std::string name = "free_fluid";  // in conditions and questions
+    double ml = 0;                    // 0: none
+    double ml_spread = 0;             // an attempt draws the volume from (1 -+ this) times ml
+    double chance = 1;                // that an attempt has it, (0, 1]
+    bool blood = false;               // fresh blood, with echoes; otherwise clear
+    std::string lies_in;              // label
+    Point3 centre;                    // `mannequin` frame
+    Vector3 half_mm;                  // of the ellipsoid: across, front to back, head to foot
     // Of the patient on the back, with the table level: away from the ground, and to the head.
     Vector3 up{0, 1, 0}, head{0, 0, 1};
 };
-inline constexpr const char* kFreeFluidName = "free_fluid";  // in conditions
 
 struct Exercise {
     std::string name;
@@ -166,7 +167,7 @@ struct Exercise {
     BreathingMotion breathing;
     Pulsation pulsation;
     Deformation deformation;
-    FreeFluid free_fluid;
+    std::vector<FreeFluid> free_fluids;  // at most SceneChange::kMaxFluids
     // Pass marks: metric name and limits, both inclusive; see docs/metrics.md.
     struct PassMark {
         std::string metric;

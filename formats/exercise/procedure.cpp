@@ -154,11 +154,13 @@ void read_question(const TomlTable& table, const Exercise& exercise, ProcedureIt
     const bool without = table.whole("answer_without", item.answer_without, 0, most);
     if (without == item.finding.empty())
         table.add_fault("finding", "and answer_without belong together", "expected both or none");
+    const auto named = [&](const auto& of) { return of.name == item.finding; };
     if (!item.finding.empty() &&
         std::none_of(exercise.findings.begin(), exercise.findings.end(),
-                     [&](const Finding& f) { return f.lesion.name == item.finding; }))
+                     [&](const Finding& f) { return named(f.lesion); }) &&
+        std::none_of(exercise.free_fluids.begin(), exercise.free_fluids.end(), named))
         table.add_fault("finding", "'" + item.finding + "' is not a finding of the exercise",
-                        "expected a name from [[findings]]");
+                        "expected a name from [[findings]] or [[free_fluid]]");
 }
 
 void read_item(const TomlTable& table, const Exercise& exercise, Procedure& procedure) {
@@ -221,7 +223,7 @@ double Procedure::points() const {
 Procedure read_procedure(const TomlTable& root, const Exercise& exercise) {
     Procedure procedure;
     procedure.depth_mm = exercise.probe.depth_mm;
-    procedure.free_fluid = exercise.free_fluid.ml > 0;
+    procedure.free_fluid = !exercise.free_fluids.empty();
     const auto head = root.table("procedure");
     if (head) {
         head->number("cut", procedure.cut, 0, 1e5);
@@ -245,7 +247,8 @@ Procedure read_procedure(const TomlTable& root, const Exercise& exercise) {
 std::string unknown_region(const Exercise& exercise, const std::vector<Label>& labels) {
     const auto known = [&](const std::string& region) {
         if (region == "body") return true;
-        if (region == kFreeFluidName && exercise.free_fluid.ml > 0) return true;
+        for (const FreeFluid& fluid : exercise.free_fluids)
+            if (fluid.name == region) return true;
         for (const Target& target : exercise.targets)
             if (target.name == region) return true;
         for (const Finding& finding : exercise.findings)

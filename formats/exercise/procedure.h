@@ -92,7 +92,7 @@ struct Procedure {
 
 // What acts have changed in the tissue, for the picture; places at rest, frame `mannequin`.
 struct SceneChange {
-    static constexpr int kMaxPools = 6, kMaxTargets = 8;
+    static constexpr int kMaxPools = 6, kMaxTargets = 8, kMaxFluids = 4;
     struct Pool {  // a ball of fluid between the tissue
         Point3 centre;
         double radius_mm = 0;
@@ -107,11 +107,12 @@ struct SceneChange {
     // Radius of the first targets over that as drawn: they shrink as they are drained.
     std::array<double, kMaxTargets> target_scale{1, 1, 1, 1, 1, 1, 1, 1};
     Line wire, catheter;
-    // The surface of free fluid: its normal, away from the ground, and its height above the
-    // fluid's centre. Without `has_level` it lies as the exercise has it.
-    bool has_level = false;
-    Vector3 level_up{0, 1, 0};
-    double level_mm = 0;
+    struct Level {  // the surface of a free fluid
+        Vector3 up{0, 1, 0};
+        double mm = 0;  // above the fluid's centre
+    };
+    std::array<Level, kMaxFluids> levels{};  // of the exercise's
+    int level_count = 0;
     // How full the veins are: outward shift of their walls, and the pressure in them; 0: that of
     // the exercise.
     double vein_wall_mm = 0, venous_pressure_mmhg = 0;

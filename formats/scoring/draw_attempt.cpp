@@ -332,8 +332,14 @@ AttemptDraw draw_attempt(const Exercise& exercise,
         }
     }
     place_findings(out, anatomy, labels, lesion_draws);
-    FreeFluid& fluid = out.exercise.free_fluid;
-    fluid.ml *= 1 + fluid.ml_spread * RandomStream(seed ^ kFluidStream).uniform(-1, 1);
+    RandomStream fluid_draws(seed ^ kFluidStream);
+    std::vector<FreeFluid> fluids;
+    for (FreeFluid fluid : out.exercise.free_fluids) {
+        fluid.ml *= 1 + fluid.ml_spread * fluid_draws.uniform(-1, 1);
+        if (fluid.chance >= 1 || fluid_draws.uniform(0, 1) < fluid.chance)
+            fluids.push_back(std::move(fluid));
+    }
+    out.exercise.free_fluids = std::move(fluids);
     if (out.exercise.start_spread_mm > 0 && !draw_start(out.exercise, anatomy, draws)) {
         out.warnings.push_back(
             "No place away from the target was found for the probe, so it "

@@ -92,15 +92,17 @@ ProcedureRun::ProcedureRun(const Exercise& exercise,
                            region.look == TargetLook::calyx;
         full_ml_.push_back(fluid ? ball_ml(region.radius_mm) : 0);
     }
-    if (exercise_->free_fluid.ml > 0 && anatomy_) {
-        fluid_.emplace(
-            exercise_->free_fluid, [&](Point3 at) { return anatomy_->label(at); }, labels);
-        fluid_region_ = static_cast<int>(regions_.size());
+    first_fluid_ = regions_.size();
+    for (const FreeFluid& free : exercise_->free_fluids) {
+        if (!anatomy_) break;
+        FreeFluidPlace place(
+            free, [&](Point3 at) { return anatomy_->label(at); }, labels);
+        full_ml_.push_back(std::min(free.ml, place.capacity_ml()));
+        fluids_.push_back({std::move(place)});
         Target fluid;
-        fluid.name = kFreeFluidName;
-        fluid.centre = exercise_->free_fluid.centre;
+        fluid.name = free.name;
+        fluid.centre = free.centre;
         regions_.push_back(std::move(fluid));
-        full_ml_.push_back(std::min(exercise_->free_fluid.ml, fluid_->capacity_ml()));
     }
     for (std::size_t l = 0; l < labels.size() && l < kind_.size(); ++l) {
         const std::string& tissue = labels[l].tissue;
@@ -144,28 +146,32 @@ void ProcedureRun::begin() {
     last_depth_mm_ = last_s_ = 0;
     started_ = false;
     new_steps_ = new_complications_ = 0;
-    settled_ml_ = -1;
-    settle_fluid();
+    for (Fluid& fluid : fluids_) fluid.settled_ml = -1;
+    settle_fluids();
 }
 
-// The free fluid runs to where is lowest now.
-void ProcedureRun::settle_fluid() {
-    if (!fluid_) return;
-    const double ml = left_ml_[fluid_region()];
-    if (ml == settled_ml_ && state_.turned_deg == settled_turn_deg_ &&
-        state_.head_down_deg == settled_tilt_deg_)
-        return;
-    settled_ml_ = ml;
+// Free fluid runs to where is lowest now.
+void ProcedureRun::settle_fluids() {
+    const bool moved =
+        state_.turned_deg != settled_turn_deg_ || state_.head_down_deg != settled_tilt_deg_;
     settled_turn_deg_ = state_.turned_deg;
     settled_tilt_deg_ = state_.head_down_deg;
-    fluid_up_ = fluid_->up(state_.turned_deg, state_.head_down_deg);
-    fluid_level_mm_ = fluid_->level_mm(ml, fluid_up_);
+    for (std::size_t i = 0; i < fluids_.size(); ++i) {
+        Fluid& fluid = fluids_[i];
+        const double ml = left_ml_[first_fluid_ + i];
+        if (ml == fluid.settled_ml && !moved) continue;
+        fluid.settled_ml = ml;
+        const Vector3 up = fluid.place.up(state_.turned_deg, state_.head_down_deg);
+        fluid.level = {up, fluid.place.level_mm(ml, up)};
+    }
 }
 
 // label: of the case, at that place.
 bool ProcedureRun::contains(std::size_t region, Point3 rest, int label) const {
-    if (static_cast<int>(region) == fluid_region_)
-        return fluid_->contains(rest, label, fluid_up_, fluid_level_mm_);
+    if (const int n = fluid_of(region); n >= 0) {
+        const Fluid& fluid = fluids_[static_cast<std::size_t>(n)];
+        return fluid.place.contains(rest, label, fluid.level.up, fluid.level.mm);
+    }
     return distance(regions_[region].centre, rest) <= regions_[region].radius_mm;
 }
 
@@ -209,7 +215,8 @@ ProcedureRun::Watch ProcedureRun::watch(const Condition& condition,
 void ProcedureRun::look(const Facts& f) {
     looked_now_ = true;
     seen_.fill(0);
-    looked_ = fluid_seen_ = 0;
+    looked_ = 0;
+    for (Fluid& fluid : fluids_) fluid.seen = 0;
     if (!f.probe_ok || !anatomy_) return;
     const int lines = looks_closely_ ? kFineLines : kLookLines,
               rows = looks_closely_ ? kFineRows : kLookRows;
@@ -238,8 +245,11 @@ void ProcedureRun::look(const Facts& f) {
                 blocked = ++air > rows / 20;  // gel bridges a gap; beyond it is air
                 continue;
             }
-            if (fluid_ && contains(fluid_region(), rest, label))
-                ++fluid_seen_;
+            const auto fluid = std::find_if(fluids_.begin(), fluids_.end(), [&](const Fluid& one) {
+                return one.place.contains(rest, label, one.level.up, one.level.mm);
+            });
+            if (fluid != fluids_.end())
+                ++fluid->seen;
             else
                 ++seen_[static_cast<std::size_t>(label)];
             blocked = anatomy_->blocks_sound(label);
@@ -260,7 +270,7 @@ bool ProcedureRun::in(const Regions& regions, const Facts& f) const {
 bool ProcedureRun::shown(const Regions& regions, double at_least, const Facts& f) {
     if (!f.probe_ok) return false;
     for (std::size_t r = 0; r < regions_.size() && r < 64; ++r) {
-        if ((regions.targets >> r & 1) == 0 || static_cast<int>(r) == fluid_region_) continue;
+        if ((regions.targets >> r & 1) == 0 || fluid_of(r) >= 0) continue;
         const Point3 now =
             anatomy_ ? anatomy_->moved(regions_[r].centre, f.time_s) : regions_[r].centre;
         const Point3 p = inverse(f.probe) * now;
@@ -268,10 +278,12 @@ bool ProcedureRun::shown(const Regions& regions, double at_least, const Facts& f
             (!anatomy_ || sound_reaches(*anatomy_, probe_, f.probe, p, f.time_s)))
             return true;
     }
-    const bool fluid = fluid_ && (regions.targets >> fluid_region() & 1) != 0;
-    if (regions.labels.none() && !fluid) return false;
+    const std::uint64_t fluids = first_fluid_ < 64 ? regions.targets >> first_fluid_ : 0;
+    if (regions.labels.none() && fluids == 0) return false;
     if (!looked_now_) look(f);
-    int points = fluid ? fluid_seen_ : 0;
+    int points = 0;
+    for (std::size_t i = 0; i < fluids_.size(); ++i)
+        if ((fluids >> i & 1) != 0) points += fluids_[i].seen;
     for (std::size_t l = 1; l < seen_.size(); ++l)
         if (regions.labels.test(l)) points += seen_[l];
     return points > at_least * looked_ && points > 0;
@@ -432,7 +444,9 @@ void ProcedureRun::aspirate(double ml, const Facts& f) {
         left -= drawn;
         state_.aspirated_ml += drawn;
         const TargetLook look = regions_[static_cast<std::size_t>(from)].look;
-        if (from == fluid_region_) return gives(exercise_->free_fluid.blood ? "blood" : "fluid");
+        if (const int n = fluid_of(static_cast<std::size_t>(from)); n >= 0)
+            return gives(exercise_->free_fluids[static_cast<std::size_t>(n)].blood ? "blood"
+                                                                                   : "fluid");
         return gives(look == TargetLook::abscess ? "pus"
                      : look == TargetLook::calyx ? "urine"
                                                  : "fluid");
@@ -640,7 +654,7 @@ void ProcedureRun::watch_needle(const Facts& f) {
         if (kind == kBile) happened(ComplicationKind::gallbladder_punctured, f.time_s);
     }
     // Free fluid has no far wall.
-    const int region = in_fluid && f.region != fluid_region_ ? f.region : -1;
+    const int region = in_fluid && fluid_of(static_cast<std::size_t>(f.region)) < 0 ? f.region : -1;
     // Elsewhere small veins of an organ lie in the way and do no harm.
     const bool vascular = exercise_->kind == "vascular";
     const int vein = vascular && !in_fluid && kind == kVein ? f.label : 0;
@@ -754,9 +768,7 @@ void ProcedureRun::update(double time_s,
         for (std::size_t r = 0; r < regions_.size(); ++r) {
             if (f.depth_mm <= 0 || !contains(r, f.tip_rest, f.label)) continue;
             // What lies in the free fluid comes before it.
-            const double d = static_cast<int>(r) == fluid_region_
-                                 ? 1e6
-                                 : distance(regions_[r].centre, f.tip_rest);
+            const double d = fluid_of(r) >= 0 ? 1e6 : distance(regions_[r].centre, f.tip_rest);
             if (d < nearest) {
                 nearest = d;
                 f.region = static_cast<int>(r);
@@ -780,7 +792,7 @@ void ProcedureRun::update(double time_s,
         if (one.amount > 0) f.act_sum[kind] += one.amount;
     }
     count_stray_acts(f);
-    settle_fluid();
+    settle_fluids();
     if (state_.compressing) {
         state_.compressed_s += f.dt_s;
         state_.bleeding_compressed_s += f.dt_s;
@@ -892,6 +904,12 @@ ProcedureView ProcedureRun::view() const {
     return view;
 }
 
+double ProcedureRun::free_fluid_ml() const {
+    double ml = 0;
+    for (std::size_t i = 0; i < fluids_.size(); ++i) ml += left_ml_[first_fluid_ + i];
+    return ml;
+}
+
 double ProcedureRun::volume_ml(int target) const {
     return target >= 0 && target < static_cast<int>(left_ml_.size())
                ? left_ml_[static_cast<std::size_t>(target)]
@@ -908,9 +926,8 @@ SceneChange ProcedureRun::scene() const {
             out.target_scale[t] = std::cbrt(left_ml_[t] / full_ml_[t]);
     out.wire = wire_;
     out.catheter = catheter_;
-    out.has_level = fluid_.has_value();
-    out.level_up = fluid_up_;
-    out.level_mm = fluid_level_mm_;
+    for (const Fluid& fluid : fluids_)
+        out.levels[static_cast<std::size_t>(out.level_count++)] = fluid.level;
     const VeinState veins =
         vein_state(exercise_->deformation, state_.head_down_deg, state_.strains);
     out.vein_wall_mm = veins.wall_mm;

@@ -201,7 +201,7 @@ class ProcedureRun {
 
     SceneChange scene() const;
     double volume_ml(int target) const;  // what a collection still holds
-    double free_fluid_ml() const { return fluid_region_ < 0 ? 0 : left_ml_[fluid_region()]; }
+    double free_fluid_ml() const;        // of all
     // `ended`: what waits still is missed.
     ProcedureResult result() const;
     std::vector<ProcedureResult::Taken> taken() const;  // by the last throw
@@ -243,9 +243,12 @@ class ProcedureRun {
     void core_throw(double mm, const Facts& facts);
     void bleed(Point3 rest, double time_s);
     Point3 wire_end(const Facts& facts, double mm) const;
-    std::size_t fluid_region() const { return static_cast<std::size_t>(fluid_region_); }
+    // Which free fluid a region is; -1: none.
+    int fluid_of(std::size_t region) const {
+        return region < first_fluid_ ? -1 : static_cast<int>(region - first_fluid_);
+    }
     bool contains(std::size_t region, Point3 rest, int label) const;
-    void settle_fluid();
+    void settle_fluids();
     int collection(const Facts& facts) const;
     void happened(ComplicationKind kind, double time_s);
     void watch_needle(const Facts& facts);
@@ -260,13 +263,16 @@ class ProcedureRun {
     bool has_items_ = false, looks_closely_ = false;
     std::vector<Watch> entry_, done_, item_;
     std::vector<int> rank_;
-    std::vector<Target> regions_;  // targets, findings, free fluid
-    int fluid_region_ = -1;
-    std::optional<FreeFluidPlace> fluid_;
-    Vector3 fluid_up_{0, 1, 0};
-    double fluid_level_mm_ = 0;
-    double settled_ml_ = -1, settled_turn_deg_ = 0, settled_tilt_deg_ = 0;
-    int fluid_seen_ = 0;  // looked-up points in it
+    std::vector<Target> regions_;  // targets, findings, free fluids
+    std::size_t first_fluid_ = 0;  // of regions_
+    struct Fluid {
+        FreeFluidPlace place;
+        SceneChange::Level level;
+        double settled_ml = -1;
+        int seen = 0;  // looked-up points in it
+    };
+    std::vector<Fluid> fluids_;
+    double settled_turn_deg_ = 0, settled_tilt_deg_ = 0;
     enum Kind : std::uint8_t { kSoft, kLung, kArtery, kVein, kBowel, kBile, kUrine, kBone, kGas };
     std::array<Kind, 256> kind_{};
     std::vector<double> left_ml_, full_ml_;  // of regions_ that hold fluid

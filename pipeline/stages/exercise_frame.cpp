@@ -216,16 +216,18 @@ Result<std::string> exercise_to_mannequin(const std::string& stripped_toml,
             normalized(triple_in(*breathing, "direction").value_or(Vector3{0, 0, -1}));
         if (at) set_triple(*breathing, "direction", mapper.direction(*at, d), 1e-6);
     }
-    if (toml::table* fluid = root["free_fluid"].as_table()) {
-        const auto centre = triple_in(*fluid, "centre");
+    const auto map_fluid = [&](toml::table& fluid) {
+        const auto centre = triple_in(fluid, "centre");
         const Vector3 usual[] = {{0, 1, 0}, {0, 0, 1}};  // in the CT: to the front, to the head
         int n = 0;
         for (const char* key : {"up", "head"}) {
-            const Vector3 d = normalized(triple_in(*fluid, key).value_or(usual[n++]));
-            if (centre) set_triple(*fluid, key, mapper.direction(*centre, d), 1e-6);
+            const Vector3 d = normalized(triple_in(fluid, key).value_or(usual[n++]));
+            if (centre) set_triple(fluid, key, mapper.direction(*centre, d), 1e-6);
         }
-        mapper.map_point(*fluid, "centre");
-    }
+        mapper.map_point(fluid, "centre");
+    };
+    if (toml::table* fluid = root["free_fluid"].as_table()) map_fluid(*fluid);
+    each_table(root, "free_fluid", map_fluid);
     mapper.map_point(root, "start_probe");
     for (const char* list : {"targets", "findings"})
         each_table(root, list, [&](toml::table& table) { mapper.map_point(table, "centre"); });

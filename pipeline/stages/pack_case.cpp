@@ -77,23 +77,23 @@ Status check_free_fluid(const Exercise& exercise,
                         const LabelVolume& volume,
                         const std::string& name,
                         const std::string& toml) {
-    const FreeFluid& fluid = exercise.free_fluid;
-    if (!(fluid.ml > 0)) return Done{};
-    const std::string where = name + ".toml:" + std::to_string(line_of(toml, fluid.lies_in));
-    const FreeFluidPlace place(
-        fluid, [&](Point3 p) { return label_at(volume, p); }, volume.labels);
-    if (place.label() < 0) {
-        std::vector<std::string> names;
-        for (std::size_t l = 1; l < volume.labels.size(); ++l)
-            names.push_back(volume.labels[l].name);
-        return Error{"free fluid lies in '" + fluid.lies_in + "', which the case lacks", where,
-                     suggest_name(fluid.lies_in, names)};
+    for (const FreeFluid& fluid : exercise.free_fluids) {
+        const std::string where = name + ".toml:" + std::to_string(line_of(toml, fluid.lies_in));
+        const FreeFluidPlace place(
+            fluid, [&](Point3 p) { return label_at(volume, p); }, volume.labels);
+        if (place.label() < 0) {
+            std::vector<std::string> names;
+            for (std::size_t l = 1; l < volume.labels.size(); ++l)
+                names.push_back(volume.labels[l].name);
+            return Error{"free fluid lies in '" + fluid.lies_in + "', which the case lacks", where,
+                         suggest_name(fluid.lies_in, names)};
+        }
+        const double max_ml = fluid.ml * (1 + fluid.ml_spread);
+        if (max_ml > place.capacity_ml())
+            return Error{number_text(max_ml, 4) + " ml of '" + fluid.name + "' do not fit", where,
+                         "'" + fluid.lies_in + "' has " + number_text(place.capacity_ml(), 4) +
+                             " ml there: lower ml, or raise half_mm"};
     }
-    const double most_ml = fluid.ml * (1 + fluid.ml_spread);
-    if (most_ml > place.capacity_ml())
-        return Error{number_text(most_ml, 4) + " ml of free fluid do not fit", where,
-                     "'" + fluid.lies_in + "' has " + number_text(place.capacity_ml(), 4) +
-                         " ml there: lower ml, or raise half_mm"};
     return Done{};
 }
 

@@ -200,7 +200,7 @@ Result<std::unique_ptr<ImageFormation>> create(const FormationInput& input) {
                                     {&jobs, textures, machine.tissue_db, machine.structures,
                                      physical::shows_fine(machine, input.exercise.probe),
                                      machine.speckle_reduction.variation > 0,
-                                     input.exercise.procedure.given(), input.exercise.free_fluid});
+                                     input.exercise.procedure.given(), input.exercise.free_fluids});
         } else {
             noise = make_physical_noise(textures->normal_levels, input.options.seed,
                                         input.scanlines + kNoiseSlack);

@@ -144,9 +144,9 @@ TEST(ReadProcedure, FreeFluidIsReadAndRefusedWhereItMakesNoSense) {
         "[free_fluid]\nml = 900\nlies_in = \"fat\"\ncentre = [1, 2, 3]\nhalf_mm = [120, 60, 90]\n";
     const auto exercise = parse_exercise(kHead + look + fluid, "x.toml");
     ASSERT_TRUE(exercise) << exercise.error().message();
-    EXPECT_EQ(exercise->free_fluid.ml, 900);
-    EXPECT_EQ(exercise->free_fluid.half_mm.y, 60);
-    EXPECT_EQ(parse_exercise(kHead + look, "x.toml")->free_fluid.ml, 0);
+    EXPECT_EQ(exercise->free_fluids.front().ml, 900);
+    EXPECT_EQ(exercise->free_fluids.front().half_mm.y, 60);
+    EXPECT_TRUE(parse_exercise(kHead + look, "x.toml")->free_fluids.empty());
     expect_fault(fluid, 2, "stands alone");
     expect_fault(look + "[free_fluid]\nlies_in = \"fat\"\n", 5, "free_fluid.ml is missing");
     expect_fault(look + "[free_fluid]\nml = 900\n", 5, "free_fluid.lies_in is missing");
@@ -154,6 +154,19 @@ TEST(ReadProcedure, FreeFluidIsReadAndRefusedWhereItMakesNoSense) {
                  "three lengths");
     expect_fault(look + fluid + "up = [0, 0, 1]\n", 5, "almost along up");
     expect_fault(look + fluid + "level_mm = 3\n", 10, "level_mm");
+    // Several have names, and each may be there or not.
+    const std::string one = "[" + fluid.substr(0, 12) + "]\nchance = 0.5\n" + fluid.substr(13);
+    const auto two = parse_exercise(
+        kHead + look + one + "name = \"left\"\n" + one + "name = \"right\"\n", "x.toml");
+    ASSERT_TRUE(two) << two.error().message();
+    ASSERT_EQ(two->free_fluids.size(), 2u);
+    EXPECT_EQ(two->free_fluids[1].name, "right");
+    EXPECT_EQ(two->free_fluids[1].chance, 0.5);
+    expect_fault(look + one, 5, "name is missing");
+    expect_fault(look + one + "name = \"left\"\n" + one + "name = \"left\"\n", 18, "twice");
+    std::string many;
+    for (int i = 0; i < 5; ++i) many += one + "name = \"" + std::to_string(i) + "\"\n";
+    expect_fault(look + many, 5, "5 times");
     // Only where there is some is it a region, and bags are emptied, not syringes.
     Label fat;
     fat.name = "fat";

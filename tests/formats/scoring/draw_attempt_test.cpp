@@ -168,22 +168,31 @@ TEST(DrawAttempt, AnOrganThatTheCaseLacksIsSaid) {
 
 TEST(DrawAttempt, FreeFluidIsDrawnAnewAndChangesNothingElse) {
     Exercise plain = exercise(), wet = plain;
-    wet.free_fluid.ml = 1000;
-    wet.free_fluid.ml_spread = 0.3;
+    wet.free_fluids.resize(2);
+    wet.free_fluids[0].ml = 1000;
+    wet.free_fluids[0].ml_spread = 0.3;
+    wet.free_fluids[1].name = "rare";
+    wet.free_fluids[1].ml = 10;
+    wet.free_fluids[1].chance = 0.3;
+    int rare = 0;
     double least = 1e9, most = 0;
     for (std::uint64_t seed = 1; seed <= 40; ++seed) {
         const AttemptDraw a = draw_attempt(plain, WindowedBall(-2), kLabels, seed),
                           b = draw_attempt(wet, WindowedBall(-2), kLabels, seed);
-        EXPECT_EQ(a.exercise.free_fluid.ml, 0);
+        EXPECT_TRUE(a.exercise.free_fluids.empty());
+        rare += static_cast<int>(b.exercise.free_fluids.size()) - 1;
         EXPECT_EQ(distance(a.exercise.targets[0].centre, b.exercise.targets[0].centre), 0);
-        least = std::min(least, b.exercise.free_fluid.ml);
-        most = std::max(most, b.exercise.free_fluid.ml);
+        least = std::min(least, b.exercise.free_fluids[0].ml);
+        most = std::max(most, b.exercise.free_fluids[0].ml);
     }
     EXPECT_GE(least, 700);
     EXPECT_LT(least, 760);  // 40 draws leave out a tenth of the range once in 70 times
     EXPECT_LE(most, 1300);
     EXPECT_GT(most, 1240);
-    EXPECT_EQ(draw_attempt(wet, WindowedBall(-2), kLabels, 0).exercise.free_fluid.ml, 1000);
+    EXPECT_NEAR(rare, 12, 9);  // three deviations of 40 draws
+    const Exercise as_written = draw_attempt(wet, WindowedBall(-2), kLabels, 0).exercise;
+    EXPECT_EQ(as_written.free_fluids[0].ml, 1000);
+    EXPECT_EQ(as_written.free_fluids.size(), 2u);
 }
 
 TEST(AttemptSeed, IsReadFromTheHeaderAndIsZeroWhereThereIsNone) {

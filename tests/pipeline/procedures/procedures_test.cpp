@@ -15,6 +15,7 @@
 #include "formats/base/random.h"
 #include "formats/exercise/exercise.h"
 #include "formats/recording/session.h"
+#include "formats/scoring/draw_attempt.h"
 #include "formats/scoring/procedure_run.h"
 #include "pipeline/procedures/analytic_anatomy.h"
 #include "support/paths.h"
@@ -180,6 +181,51 @@ TEST(Procedures, TheExpertPassesEachWithEveryItem) {
                         result.steps[i].time_s > result.steps[i - 1].time_s)
                 << name << ", step " << i;
     }
+}
+
+// What an attempt draws, its picture shows from where the expert looks, and its answers mean.
+TEST(Procedures, WhoReadsThePictureAnswersRightWhateverIsDrawn) {
+    int there = 0, absent = 0;
+    for (const std::string& name : procedures()) {
+        const Exercise exercise = procedure_called(name);
+        const testing::AnalyticAnatomy& body = body_of(name);
+        const auto& items = exercise.procedure.items;
+        if (std::all_of(items.begin(), items.end(),
+                        [](const ProcedureItem& item) { return item.finding.empty(); }))
+            continue;
+        for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+            const Exercise drawn = draw_attempt(exercise, body, body.labels(), seed).exercise;
+            Session session = play(drawn);
+            Exercise watched = drawn;  // with a step for each that the picture may show
+            for (const ProcedureItem& item : items) {
+                ProcedureStep& step = watched.procedure.steps.emplace_back();
+                step.group = "seen";
+                step.done.shows = {item.finding.empty() ? "nothing" : item.finding};
+                step.done.shows_at_least = 0.004;
+            }
+            const ProcedureResult seen = judge(session, watched);
+            for (SessionSample& sample : session.samples) {
+                ActList acts;
+                for (int a = 0; a < sample.acts.count; ++a) {
+                    Act act = sample.acts.acts[a];
+                    const auto asked = static_cast<std::size_t>(act.index);
+                    if (act.kind == ActKind::answer && !items[asked].finding.empty()) {
+                        const bool shows =
+                            seen.steps[drawn.procedure.steps.size() + asked].time_s >= 0;
+                        act.amount = shows ? items[asked].answer : items[asked].answer_without;
+                        ++(shows ? there : absent);
+                    }
+                    acts.add(act);
+                }
+                sample.acts = acts;
+            }
+            const ProcedureResult result = judge(session, drawn);
+            EXPECT_EQ(joined(missed(result)), "") << name << ", attempt " << seed;
+            EXPECT_TRUE(result.passed) << name << ", attempt " << seed;
+        }
+    }
+    EXPECT_GT(there, 8);
+    EXPECT_GT(absent, 8);
 }
 
 TEST(Procedures, WhoSkipsAnActFailsItsItemAlone) {
@@ -540,7 +586,7 @@ TEST(Procedures, FluidBeforeAVeinPushesItAwayFromTheTip) {
 
 TEST(Procedures, FreeFluidRunsToWhereIsLowestAndLeavesWithTheDrain) {
     Held held("paracentesis");
-    const FreeFluid& fluid = held.exercise().free_fluid;
+    const FreeFluid& fluid = held.exercise().free_fluids.front();
     const Point3 left{-95, 50, -92}, right{95, 50, -92};  // in fat, high in the flanks
     const Vector3 way{0.953, -0.303, 0};
     const auto tip_gives = [&](Point3 tip, const char* acts) {
@@ -556,9 +602,9 @@ TEST(Procedures, FreeFluidRunsToWhereIsLowestAndLeavesWithTheDrain) {
     EXPECT_EQ(tip_gives(left, "turn=30"), "fluid");
     held.at(left, way, "catheter=1");
     EXPECT_EQ(held.machine().state().turned_deg, 30);
-    const double before_mm = held.machine().scene().level_mm;
+    const double before_mm = held.machine().scene().levels[0].mm;
     held.at(left, way, "drain=250");
-    EXPECT_LT(held.machine().scene().level_mm, before_mm - 3);
+    EXPECT_LT(held.machine().scene().levels[0].mm, before_mm - 3);
     for (int i = 0; i < 8; ++i) held.at(left, way, "drain=250");
     EXPECT_EQ(held.machine().free_fluid_ml(), 0);
     EXPECT_NEAR(held.machine().state().drained_ml + held.machine().state().aspirated_ml, fluid.ml,

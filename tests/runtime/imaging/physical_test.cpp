@@ -84,16 +84,16 @@ TEST(PhysicalModel, LesionsOfAKindAgreeWithTheSlowRenderer) {
 TEST(PhysicalModel, WhatActsPutIntoTheTissueAgreesWithTheSlowRenderer) {
     Exercise exercise = phantom_exercise();
     exercise.procedure.items.emplace_back();
-    exercise.free_fluid.ml = 100;
-    exercise.free_fluid.lies_in = "liver";
-    exercise.free_fluid.centre = {5, 0, 70};
-    exercise.free_fluid.half_mm = {40, 30, 25};
+    FreeFluid& free = exercise.free_fluids.emplace_back();
+    free.ml = 100;
+    free.lies_in = "liver";
+    free.centre = {5, 0, 70};
+    free.half_mm = {40, 30, 25};
     FrameInput input;
     const auto plain = draw(exercise, physical_options(), input);
     SceneChange& change = input.change;
-    change.has_level = true;
-    change.level_up = normalized(Vector3{0.3, 0.1, -1});
-    change.level_mm = 4;
+    change.level_count = 1;
+    change.levels[0] = {normalized(Vector3{0.3, 0.1, -1}), 4};
     const auto fluid = draw(exercise, physical_options(), input);
     change.pool_count = 2;
     change.pools[0] = {{-25, 1, 35}, 5, false};

@@ -200,10 +200,9 @@ void add_act_tissues(PhysicalScene& s) {
 }
 
 void add_free_fluid(const FreeFluid& fluid, PhysicalScene& s) {
-    if (!(fluid.ml > 0) || s.clear_pool < 0) return;
+    TargetBall ball;
     for (std::size_t l = 1; l < s.bundle->labels.size(); ++l) {
         if (s.bundle->labels[l].name != fluid.lies_in) continue;
-        TargetBall ball;
         ball.centre_vx = s.grid.voxel_from_point(fluid.centre);
         const Vector3 h = fluid.half_mm;
         ball.radius_mm = std::cbrt(h.x * h.y * h.z);
@@ -216,8 +215,8 @@ void add_free_fluid(const FreeFluid& fluid, PhysicalScene& s) {
         ball.acoustics = fluid.blood ? s.blood_pool : s.clear_pool;
         ball.fluid = true;
         ball.only_label = static_cast<int>(l);
-        s.free_fluid = ball;
     }
+    s.free_fluids.push_back(ball);  // of no size where no label has the name
 }
 
 // Adds the acoustic properties of labels and targets, and the echoes between labels.
@@ -254,7 +253,8 @@ void add_tissues(const CaseBundle& bundle,
     }
     add_targets(targets, s);
     if (options.acts) add_act_tissues(s);
-    add_free_fluid(options.free_fluid, s);
+    if (options.acts)
+        for (const FreeFluid& fluid : options.free_fluids) add_free_fluid(fluid, s);
     for (AcousticProperties& a : s.acoustics) {
         if (a.kind == TissueKind::fluid) a.attenuation += kFluidSteepening;
     }
@@ -337,10 +337,11 @@ void balls_of_frame(const PhysicalScene& scene,
                     const Matrix3* pushed_axes,
                     std::vector<TargetBall>& balls) {
     balls.clear();
-    if (scene.free_fluid && change.has_level) {  // everything else lies in it
-        balls.push_back(*scene.free_fluid);
-        balls.back().level_up = change.level_up;
-        balls.back().level_mm = change.level_mm;
+    for (std::size_t i = 0; i < scene.free_fluids.size(); ++i) {  // everything else lies in them
+        if (static_cast<int>(i) >= change.level_count) break;
+        balls.push_back(scene.free_fluids[i]);
+        balls.back().level_up = change.levels[i].up;
+        balls.back().level_mm = change.levels[i].mm;
     }
     for (TargetBall ball : scene.targets) {
         const int target = ball.lesion - first_target;

@@ -103,7 +103,7 @@ struct PhysicalScene {
     std::vector<TargetBall> targets;
     // Acoustics of what acts put into the tissue; -1: the exercise has no procedure.
     int clear_pool = -1, blood_pool = -1, wire = -1, catheter = -1;
-    std::optional<TargetBall> free_fluid;  // without its level
+    std::vector<TargetBall> free_fluids;  // without their levels
 
     int labels() const { return static_cast<int>(bundle->labels.size()); }
 };
@@ -116,7 +116,7 @@ struct PhysicalSceneOptions {
     bool fine = false;                                 // physical::shows_fine()
     bool speckle_reduction = true;                     // whether the machine has it
     bool acts = false;                                 // the exercise has a procedure
-    FreeFluid free_fluid;                              // of the exercise
+    std::vector<FreeFluid> free_fluids;                // of the exercise
 };
 
 // targets: those of the exercise, with its findings; those that only mark a place do not show in
@@ -133,7 +133,8 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
 // (formats/exercise/pool_shift.h), so that their fluid takes the place of what is left within them;
 // null: they lie in place of the tissue.
 // balls: cleared; allocates nothing within kMaxFrameBalls.
-inline constexpr std::size_t kMaxFrameBalls = physical::kMaxTargets + SceneChange::kMaxPools + 5;
+inline constexpr std::size_t kMaxFrameBalls =
+    physical::kMaxTargets + SceneChange::kMaxPools + SceneChange::kMaxFluids + 4;
 void balls_of_frame(const PhysicalScene& scene,
                     const SceneChange& change,
                     int first_target,
