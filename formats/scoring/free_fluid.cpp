@@ -12,8 +12,6 @@
 namespace sonocase {
 namespace {
 
-constexpr double kPointsOfBox = 40000;  // of which an ellipsoid has half
-
 bool in_ellipsoid(const FreeFluid& fluid, const Matrix3& axes, Vector3 from_centre) {
     const Vector3 p = transpose(axes) * from_centre;
     const Vector3 u{p.x / fluid.half_mm.x, p.y / fluid.half_mm.y, p.z / fluid.half_mm.z};
@@ -24,14 +22,16 @@ bool in_ellipsoid(const FreeFluid& fluid, const Matrix3& axes, Vector3 from_cent
 
 FreeFluidPlace::FreeFluidPlace(const FreeFluid& fluid,
                                const std::function<int(Point3)>& label_at,
-                               const std::vector<Label>& labels)
+                               const std::vector<Label>& labels,
+                               int points)
     : fluid_(fluid), axes_(free_fluid_axes(fluid)) {
     if (!(fluid.ml > 0)) return;
     for (std::size_t l = 1; l < labels.size(); ++l)
         if (labels[l].name == fluid.lies_in) label_ = static_cast<int>(l);
     if (label_ < 0) return;
     const Vector3 h = fluid.half_mm;
-    const double cell_mm = std::cbrt(8 * h.x * h.y * h.z / kPointsOfBox);
+    // An ellipsoid has half the points of the box around it.
+    const double cell_mm = std::cbrt(8 * h.x * h.y * h.z / (2.0 * points));
     point_ml_ = cell_mm * cell_mm * cell_mm / 1000;
     // Anywhere in its cell, so that points in one plane do not all get wet at the same level.
     RandomStream draws(1);

@@ -14,11 +14,13 @@ namespace sonocase {
 
 class FreeFluidPlace {
   public:
-    // Looks up some 20,000 points of the ellipsoid, at rest; a few ms. Without free fluid, or
+    static constexpr int kPoints = 20000;
+    // Looks up some `points` points of the ellipsoid, at rest; a few ms. Without free fluid, or
     // where no label has the name, nothing holds any.
     FreeFluidPlace(const FreeFluid& fluid,
                    const std::function<int(Point3)>& label_at,
-                   const std::vector<Label>& labels);
+                   const std::vector<Label>& labels,
+                   int points = kPoints);
 
     double capacity_ml() const { return static_cast<double>(points_.size()) * point_ml_; }
     int label() const { return label_; }  // whose place it takes; -1: none

@@ -48,6 +48,8 @@ Suite spectrum_suite();
 // Pixels, corners and tags of a camera that follows printed markers, by the program camera_trial
 // beside this one.
 Suite camera_suite();
+// Points that the level of free fluid is counted by, in ellipsoids cut at known volumes.
+Suite fluid_suite();
 // The cost that a build predicts against the time it takes, measured by commands.
 Suite cost_suite();
 // The whole chain on the demo torso, or another body of the same family.

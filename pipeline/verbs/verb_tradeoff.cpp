@@ -75,6 +75,7 @@ std::vector<NamedSuite> suites() {
         {"linear", linear_suite},
         {"region", region_suite},
         {"pathology", pathology_suite},
+        {"fluid", fluid_suite},
         {"cost", cost_suite},
         {"case", [] { return case_suite({}, kTimedBody); }},
         {"case", [] { return case_suite(*analytic_body("slender"), "slender"); }},
@@ -193,7 +194,7 @@ int verb_tradeoff(int argc, char** argv) {
         if (names.back() != named.name) names.emplace_back(named.name);
     for (const char* name : {"press", "colour", "spectrum", "camera"}) names.emplace_back(name);
     app.add_option("--suite", options.suites,
-                   "Which stage; may be repeated. All but the last three unless --case is given")
+                   "Which stage; may be repeated. All but the last four unless --case is given")
         ->allow_extra_args(false)
         ->check(CLI::IsMember(names));
     app.add_flag("--quick", options.quick,
