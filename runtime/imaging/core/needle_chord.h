@@ -31,6 +31,7 @@ struct NeedleShape {
     double tip_opacity = 1, shaft_opacity = 1;
     Vector3 bevel{0, 0, -1};  // unit: the side that the bevel faces
     const NeedleMake* make = &needle_makes().front();
+    double echo = 1, tail = 1;  // model physical: amplitudes over those of a needle
 };
 
 inline constexpr double kMinSlabMm = 1e-3;
@@ -90,8 +91,8 @@ struct NeedleRow {
     alignas(64) float direction_x[kBeamBlock];
     alignas(64) float direction_z[kBeamBlock];
     float step, wy, ax, ay, az, a, radius, length, slab, tip_opacity, shaft_opacity, inverse_reach;
-    float bevel_x, bevel_z, rough, inverse_lobe2, tip_middle,
-        tip_swing;  // NeedleMake, model physical
+    // Model physical.
+    float bevel_x, bevel_z, rough, inverse_lobe2, tip_middle, tip_swing, echo, tail;
 };
 
 // The part of the needle that the slab can show, projected on the plane: a segment with a radius.
@@ -190,6 +191,8 @@ class NeedleStrip {
         row.rough = static_cast<float>(make.rough);
         row.inverse_lobe2 = static_cast<float>(1 / (make.lobe_sin * make.lobe_sin));
         row.tip_middle = static_cast<float>(0.5 * (make.tip_towards + make.tip_away));
+        row.echo = static_cast<float>(n.echo);
+        row.tail = static_cast<float>(n.tail);
         row.tip_swing = static_cast<float>(0.5 * (make.tip_towards - make.tip_away));
         return true;
     }

@@ -3,6 +3,7 @@
 #include "runtime/imaging/physical/physical_formation.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -35,6 +36,21 @@ PhysicalEffects shown_by(PhysicalEffects on, const MachineStructures& machine) {
     return on;
 }
 
+// A guide wire is coiled, and sends some echo back at every angle; a catheter's walls are smooth
+// plastic, drawn as thick as the samples lie apart. Diameters are those of a usual central line; the
+// rest is assumed.
+constexpr NeedleMake kWire{"wire", "", 0.9, 0.12, 0.2, 0.12, 0.12, true, 0, 0, 0, 0};
+constexpr NeedleMake kCatheterWall{"catheter", "", 0.6, 0.15, 0.2, 0.15, 0.15, false, 0, 0, 0, 0};
+NeedleShape shape_of(const NeedleMake& make, double echo, double tail) {
+    NeedleShape shape;
+    shape.make = &make;
+    shape.radius_mm = 0.5 * make.diameter_mm;
+    shape.echo = echo;
+    shape.tail = tail;
+    return shape;
+}
+constexpr double kCatheterMm = 2.3;  // from wall to wall
+
 class PhysicalFormation final : public ImageFormation {
   public:
     PhysicalFormation(PhysicalScene scene, PhysicalNoise noise, const FormationInput& input)
@@ -51,7 +67,7 @@ class PhysicalFormation final : public ImageFormation {
           context_(input.context),
           machine_(machine_of(input)) {
         if (exercise_.breathing.amplitude_mm != 0) breathing_ = BreathingField(*input.bundle);
-        if (scene_.wire >= 0) balls_.reserve(kMaxFrameBalls);
+        if (scene_.has_acts) balls_.reserve(kMaxFrameBalls);
         const auto make_background = input.options.host.make_background;
         if (input.options.read_ahead && blocks_ != nullptr && !reference_ &&
             make_background != nullptr)
@@ -99,15 +115,13 @@ class PhysicalFormation final : public ImageFormation {
     }
 
     std::size_t pools_of(const FrameInput& input, Pools& out) const override {
-        if (scene_.wire < 0 || !shown_.deformation) return 0;
+        if (!scene_.has_acts || !shown_.deformation) return 0;
         const MotionState motion = motion_of(input);
         const int count = std::clamp(input.change.pool_count, 0, SceneChange::kMaxPools);
         for (int i = 0; i < count; ++i) {
             SceneChange::Pool& pool = out[static_cast<std::size_t>(i)];
             pool = input.change.pools[static_cast<std::size_t>(i)];
-            const Point3 rest = pool.centre;
-            for (int step = 0; step < 4 && shown_.breathing && motion.breathes(); ++step)
-                pool.centre = rest + breathing_.weight(pool.centre) * motion.breathing_mm;
+            pool.centre = breathed(pool.centre, motion);
         }
         return static_cast<std::size_t>(count);
     }
@@ -148,7 +162,6 @@ class PhysicalFormation final : public ImageFormation {
         const FrameInput& input = request.input;
         PhysicalFrame frame;
         frame.volume_from_probe = input.mannequin_from_probe;
-        frame.needle = request.needle;
         frame.seed = seed_;
         frame.frame = input.frame;
         frame.row_gain_db = request.row_gain_db;
@@ -160,13 +173,62 @@ class PhysicalFormation final : public ImageFormation {
             std::isfinite(input.change.vein_wall_mm) ? input.change.vein_wall_mm : 0;
         frame.effects = shown_;
         frame.press = shown_.deformation ? request.press : nullptr;
-        if (scene_.wire >= 0) {  // the exercise has a procedure
+        std::size_t count = 0;
+        if (request.needle != nullptr) needles_[count++] = *request.needle;
+        if (scene_.has_acts) {
             const bool pushes = frame.press != nullptr && !frame.press->pools().empty();
             balls_of_frame(scene_, input.change, static_cast<int>(exercise_.findings.size()),
                            pushes ? &frame.volume_from_probe.rotation : nullptr, balls_);
             frame.balls = &balls_;
+            add_tube(input.change.catheter, frame, count);
+            add_line(input.change.wire, shape_of(kWire, 0.7, 0.2), 0, frame, count);
         }
+        frame.needles = {needles_.data(), count};
         return frame;
+    }
+
+    // Where a point at rest is now, probe frame.
+    Point3 now(Point3 rest, const PhysicalFrame& frame) const {
+        const Point3 p = inverse(frame.volume_from_probe) * breathed(rest, frame.motion);
+        if (frame.press == nullptr) return p;
+        const PlanePoint q = press::shown_point(*frame.press, {p.x, p.z});
+        return {q.x, p.y, q.z};
+    }
+    Point3 breathed(Point3 rest, const MotionState& motion) const {
+        Point3 p = rest;
+        for (int step = 0; step < 4 && shown_.breathing && motion.breathes(); ++step)
+            p = rest + breathing_.weight(p) * motion.breathing_mm;
+        return p;
+    }
+
+    // Adds both parts of a line, beside_mm off its axis in the scan plane.
+    void add_line(const SceneChange::Line& line,
+                  NeedleShape shape,
+                  double beside_mm,
+                  const PhysicalFrame& frame,
+                  std::size_t& count) const {
+        if (!line.in) return;
+        shape.slab_mm = std::max(exercise_.probe.elevation_mm, kMinSlabMm);
+        const Point3 points[] = {now(line.from, frame), now(line.turn, frame), now(line.to, frame)};
+        for (int part = 0; part < 2; ++part) {
+            const Vector3 along = points[part + 1] - points[part];
+            shape.length_mm = norm(along);
+            if (!(shape.length_mm > shape.make->diameter_mm)) continue;
+            shape.axis = along / shape.length_mm;
+            // In a plane across the line its walls show one below the other.
+            const Vector3 below =
+                std::abs(shape.axis.z) < 0.9 ? Vector3{0, 0, 1} : Vector3{1, 0, 0};
+            const Vector3 beside = normalized(below - dot(below, shape.axis) * shape.axis);
+            shape.tip = points[part + 1] + beside_mm * beside;
+            needles_[count++] = shape;
+        }
+    }
+    // A catheter shows as its two walls.
+    void add_tube(const SceneChange::Line& line,
+                  const PhysicalFrame& frame,
+                  std::size_t& count) const {
+        for (const double side : {-0.5, 0.5})
+            add_line(line, shape_of(kCatheterWall, 0.4, 0.1), side * kCatheterMm, frame, count);
     }
 
     const Exercise& exercise_;
@@ -182,7 +244,8 @@ class PhysicalFormation final : public ImageFormation {
     const Machine machine_;
     std::vector<std::unique_ptr<Level>> levels_;
     mutable std::vector<TargetBall> balls_;  // of the present frame
-    std::optional<ReadAhead> ahead_;         // ends before the levels that it refers to
+    mutable std::array<NeedleShape, kMaxNeedles> needles_;
+    std::optional<ReadAhead> ahead_;  // ends before the levels that it refers to
 };
 
 Result<std::unique_ptr<ImageFormation>> create(const FormationInput& input) {

@@ -181,6 +181,18 @@ TEST(PhysicalModel, PoolsPushPlanesAsideByWhatWasInjected) {
         EXPECT_NEAR(volume, 0.94, 0.06);  // what the pool itself covers is not pushed
         EXPECT_GT(best, 0.6);             // without the pool: about 0
     }
+    // A wire through the pool is as thick as one through tissue: fluid does not stretch metal.
+    const auto thickness = [&](FrameInput input) {
+        input.change.wire = {true, {-20, 0, 14}, {4, 0, 14}, {20, 0, 14}};
+        const auto picture = draw(exercise, fine, input);
+        const int column = static_cast<int>(layout.origin_x_px + 2 / layout.mm_per_px);
+        int bright = 0;
+        for (int row = 0; row < 512; ++row) bright += picture[row * 512 + column] > 200;
+        return bright * layout.mm_per_px;
+    };
+    const double in_tissue = thickness({}), in_pool = thickness(pool_of(1.5));
+    EXPECT_GT(in_tissue, 0.5);
+    EXPECT_NEAR(in_pool, in_tissue, 0.3);
     RenderOptions quick = physical_options(), slow = physical_options(RendererKind::reference);
     quick.samples = slow.samples = 200;
     quick.scanlines = slow.scanlines = 64;

@@ -142,7 +142,8 @@ void needle_physical(PhysicalBlock& b, const NeedleRow& n, int row_begin, int ro
                     hn::Max(hn::Min(hn::Sub(hn::Set(d, 2.0f), chord.from_tip_mm), one), zero);
                 const auto base = hn::Add(rough, hn::Mul(hn::Sub(tip, rough), tip_part));
                 const auto bright = hn::Add(base, hn::Mul(hn::Sub(one, base), mirror));
-                const auto strength = hn::Mul(seen, hn::Set(d, static_cast<float>(kNeedleGain)));
+                const auto strength =
+                    hn::Mul(seen, hn::Set(d, static_cast<float>(kNeedleGain) * n.echo));
                 const auto mirrored =
                     hn::Mul(hn::Mul(strength, bright), hn::Set(d, b.interface_scale[k]));
                 for (int look = 0; look < b.looks_at[k]; ++look) {
@@ -155,7 +156,7 @@ void needle_physical(PhysicalBlock& b, const NeedleRow& n, int row_begin, int ro
                 tail = hn::Max(tail,
                                hn::Mul(hn::Mul(strength, hn::Add(rough, mirror)),
                                        hn::Mul(light, hn::Set(d, static_cast<float>(kNeedleTail) *
-                                                                     b.gain[k]))));
+                                                                     n.tail * b.gain[k]))));
                 shade = hn::Sub(shade, hn::Mul(seen, hn::Set(d, dim)));
                 lines = hn::IfThenZeroElse(hn::Gt(seen, zero), lines);
             }

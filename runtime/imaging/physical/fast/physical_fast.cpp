@@ -549,8 +549,10 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
     slice_ = speckle_slice(f.volume_from_probe.rotation * Vector3{0, 1, 0}, tables_.cell_mm);
     const PhysicalBlock base = block_of_frame(f, keep_all);
     const bool breathes = f.effects.breathing && f.motion.breathes() && !breathing.empty();
-    const bool needle = f.effects.needle && f.needle != nullptr;
-    const NeedleStrip strip = needle ? NeedleStrip(*f.needle) : NeedleStrip();
+    const std::span<const NeedleShape> needles =
+        f.effects.needle ? f.needles : std::span<const NeedleShape>();
+    std::array<NeedleStrip, kMaxNeedles> strips;
+    for (std::size_t i = 0; i < needles.size(); ++i) strips[i] = NeedleStrip(needles[i]);
     streak_count_ =
         f.effects.streaks
             ? find_streaks(scene_, g, tables_, f, breathes ? &breathing : nullptr, gaps_, streaks_)
@@ -586,9 +588,10 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         b.clutter = clutter ? clutter_ + kRowMargin + line : nullptr;
         sample_beam_block(context_.simd, b);
         met.add(b);
-        NeedleRow row;
-        int k0 = 0, k1 = 0;
-        if (needle && strip.prepare_block(*f.needle, g, line, keep_all, row, k0, k1)) {
+        for (std::size_t i = 0; i < needles.size(); ++i) {
+            NeedleRow row;
+            int k0 = 0, k1 = 0;
+            if (!strips[i].prepare_block(needles[i], g, line, keep_all, row, k0, k1)) continue;
             PassTimer timer(context_.clock);
             // A beam in air shows none, though its neighbours' light spreads into it.
             constexpr float kFarMm = 1e4f;
@@ -620,7 +623,7 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
     met_.dome = met.dome;
     met_.wall = met.wall;
     met_.parenchyma = met.parenchyma;
-    met_.needle_given = f.needle != nullptr;
+    met_.needle_given = !f.needles.empty();
     met_.needle = met.needle;
     meet_machine(f);
     return needle_ms.load() / context_.workers.threads();

@@ -51,9 +51,12 @@ inline void press_surface(
 
 namespace sonocase::runtime {
 
+inline constexpr std::size_t kMaxNeedles = 7;  // of a frame: a needle, a wire's parts, a catheter's
+
 struct PhysicalFrame {
     Rigid volume_from_probe;
-    const NeedleShape* needle = nullptr;  // probe frame; null: none
+    // Probe frame: the needle, and the straight parts of a wire and a catheter.
+    std::span<const NeedleShape> needles;
     std::uint32_t seed = 1, frame = 0;
     std::span<const float> row_gain_db;  // # samples: console gain and TGC sliders
     double dynamic_range_db = 60;

@@ -185,18 +185,16 @@ void add_targets(const std::vector<Target>& targets, PhysicalScene& s) {
     }
 }
 
-// Local anaesthetic is clear, fresh blood has faint echoes; a wire reflects all along, and a
-// catheter is a wall about fluid. Levels re liver, dB (assumed).
+// Local anaesthetic is clear, fresh blood has faint echoes. Levels re liver, dB (assumed).
 void add_act_tissues(PhysicalScene& s) {
-    if (s.acoustics.size() + 4 > 255) return;
+    if (s.acoustics.size() + 2 > 255) return;
+    s.has_acts = true;
     const auto add = [&](const AcousticProperties& a) {
         s.acoustics.push_back(a);
         return static_cast<int>(s.acoustics.size()) - 1;
     };
     s.clear_pool = add({-50, 0.02, TissueKind::fluid});
     s.blood_pool = add({-14, 0.18, TissueKind::fluid});
-    s.wire = add({22, 3, TissueKind::soft});
-    s.catheter = add({-30, 0.3, TissueKind::fluid});
 }
 
 void add_free_fluid(const FreeFluid& fluid, PhysicalScene& s) {
@@ -253,7 +251,7 @@ void add_tissues(const CaseBundle& bundle,
     }
     add_targets(targets, s);
     if (options.acts) add_act_tissues(s);
-    if (options.acts)
+    if (s.has_acts)
         for (const FreeFluid& fluid : options.free_fluids) add_free_fluid(fluid, s);
     for (AcousticProperties& a : s.acoustics) {
         if (a.kind == TissueKind::fluid) a.attenuation += kFluidSteepening;
@@ -352,7 +350,7 @@ void balls_of_frame(const PhysicalScene& scene,
         }
         if (ball.radius_mm >= kMinPoolMm) balls.push_back(ball);
     }
-    if (scene.wire < 0) return;
+    if (!scene.has_acts) return;
     for (int i = 0; i < change.pool_count; ++i) {
         const SceneChange::Pool& pool = change.pools[static_cast<std::size_t>(i)];
         if (pool.radius_mm < kMinPoolMm) continue;
@@ -372,34 +370,6 @@ void balls_of_frame(const PhysicalScene& scene,
         ball.covers = true;
         balls.push_back(ball);
     }
-    // An ellipsoid as long as the line; as thick as the slab shows it at least.
-    const auto add_part = [&](Point3 from, Point3 to, double radius_mm, int acoustics,
-                              double wall) {
-        const Vector3 along = to - from;
-        const double half_mm = 0.5 * norm(along);
-        if (!(half_mm > radius_mm)) return;
-        TargetBall ball;
-        ball.centre_vx = scene.grid.voxel_from_point(from + 0.5 * along);
-        ball.radius_mm = radius_mm;
-        ball.reach_mm = half_mm;
-        ball.round = false;
-        const Vector3 z = normalized(along), x = any_perpendicular(z);
-        const Matrix3 axes = Matrix3::from_columns(x, cross(z, x), z);
-        const double thin = radius_mm / half_mm;
-        ball.shape = axes * Matrix3::diagonal({1, 1, thin * thin}) * transpose(axes);
-        ball.acoustics = acoustics;
-        ball.wall = wall;
-        ball.anywhere = true;
-        balls.push_back(ball);
-    };
-    const auto add_line = [&](const SceneChange::Line& line, double radius_mm, int acoustics,
-                              double wall) {
-        if (!line.in) return;
-        add_part(line.from, line.turn, radius_mm, acoustics, wall);
-        add_part(line.turn, line.to, radius_mm, acoustics, wall);
-    };
-    add_line(change.catheter, 1.5, scene.catheter, 14);
-    add_line(change.wire, 0.5, scene.wire, 20);
 }
 
 }  // namespace sonocase::runtime

@@ -52,7 +52,7 @@ struct TargetBall {
     int acoustics = 0;    // index into PhysicalScene::acoustics
     double wall = 0;      // amplitude of its surface
     bool fluid = false;
-    bool anywhere = false;  // shows in fluid as well: a wire or catheter
+    bool anywhere = false;  // shows in fluid as well
     bool covers = false;    // hides the surfaces of the tissue in it: a pool
     // Free fluid: it has no surface of its own, takes the place of this label alone, and ends at a
     // plane so far above the centre; up: unit vector in the volume.
@@ -101,8 +101,9 @@ struct PhysicalScene {
     TissueLayers layers;
 
     std::vector<TargetBall> targets;
-    // Acoustics of what acts put into the tissue; -1: the exercise has no procedure.
-    int clear_pool = -1, blood_pool = -1, wire = -1, catheter = -1;
+    bool has_acts = false;  // the exercise has a procedure
+    // Acoustics of what acts put into the tissue; -1: none.
+    int clear_pool = -1, blood_pool = -1;
     std::vector<TargetBall> free_fluids;  // without their levels
 
     int labels() const { return static_cast<int>(bundle->labels.size()); }
@@ -134,7 +135,7 @@ Result<PhysicalScene> make_physical_scene(CaseView view,
 // null: they lie in place of the tissue.
 // balls: cleared; allocates nothing within kMaxFrameBalls.
 inline constexpr std::size_t kMaxFrameBalls =
-    physical::kMaxTargets + SceneChange::kMaxPools + SceneChange::kMaxFluids + 4;
+    physical::kMaxTargets + SceneChange::kMaxPools + SceneChange::kMaxFluids;
 void balls_of_frame(const PhysicalScene& scene,
                     const SceneChange& change,
                     int first_target,

@@ -18,10 +18,12 @@ using namespace physical;
 // What one beam carries down from sample to sample.
 struct BeamLight {
     double log2_light = 0;    // log2 of the light left after the tissue, there and back
-    double needle_light = 0;  // log2 of the light left after the needle
-    double bone = 0, bone_slow = 0, bone_floor = 0, gas = 0, needle_tail = 0;  // tails, amplitudes
-    double needle_lines = 0;                  // since the needle, diameters
-    double lit = 0;                           // the last light well before a face of gas
+    double needle_light = 0;  // log2 of the light left after all needles
+    std::array<double, kMaxNeedles> past{};                   // after each alone
+    double bone = 0, bone_slow = 0, bone_floor = 0, gas = 0;  // tails, amplitudes
+    std::array<double, kMaxNeedles> needle_tail{};
+    std::array<double, kMaxNeedles> needle_lines{};  // since the needle, diameters
+    double lit = 0;                                  // the last light well before a face of gas
     double reverb = 0, period = 0, next = 0;  // next line: amplitude, mm between lines, its depth
     double clutter = 0;                       // power
     TissueKind before = TissueKind::soft, before_that = TissueKind::soft;  // two samples above
@@ -31,7 +33,7 @@ struct BeamLight {
         bone_slow *= std::exp(-step_mm / kBoneTailSlowMm);
         bone_floor *= std::exp(-step_mm / kBoneFloorMm);
         gas *= std::exp(-step_mm / kGasTailMm);
-        needle_tail *= std::exp(-step_mm / kNeedleTailMm);
+        for (double& tail : needle_tail) tail *= std::exp(-step_mm / kNeedleTailMm);
     }
 };
 
@@ -90,29 +92,39 @@ void meet_needle(const ReferenceInput& in,
                  PlanePoint d,
                  Sample& p,
                  BeamLight& t) {
-    if (!in.frame.effects.needle || in.frame.needle == nullptr) return;
-    const NeedleShape& n = *in.frame.needle;
     const double r = p.row.r_mm;
     // What is there behind the diaphragm is a mirror image of something else.
-    if (r >= face.dome_mm) return;
-    double back = 0;
-    const double share = needle_share(n, o.x + r * d.x, o.z + r * d.z, back);
-    const double seen = std::min(share * n.slab_mm / (2 * n.radius_mm), 1.0);
-    if (!(seen > 0)) return;
-    const double cosine = n.axis.x * d.x + n.axis.z * d.z;
-    const NeedleMake& make = *n.make;
-    const double mirror = std::exp2(-cosine * cosine / (make.lobe_sin * make.lobe_sin));
-    const double sine = std::sqrt(std::max(1 - cosine * cosine, 0.01));
-    const double faces = std::clamp(-(n.bevel.x * d.x + n.bevel.z * d.z) / sine, -1.0, 1.0);
-    const double tip = make.tip_away + (make.tip_towards - make.tip_away) * 0.5 * (1 + faces);
-    const double base = make.rough + (tip - make.rough) * needle_tip_part(back);
-    const double i = kNeedleGain * seen * (base + (1 - base) * mirror) * p.row.interface_scale;
-    t.needle_lines = 0;
-    p.re += i;
-    t.needle_light -=
-        kNeedleShadowLog2 * seen * std::min(in.geometry.step_mm / (2 * n.radius_mm), 1.0);
-    t.needle_tail = std::max(t.needle_tail, kNeedleTail * kNeedleGain * seen *
-                                                (make.rough + mirror) * p.here * p.row.gain);
+    if (!in.frame.effects.needle || r >= face.dome_mm) return;
+    double others = 0;  // log2 of the light left after the needles drawn before
+    for (std::size_t number = 0; number < in.frame.needles.size(); ++number) {
+        const NeedleShape& n = in.frame.needles[number];
+        const double light = p.here * std::exp2(others) * p.row.gain;
+        double back = 0;
+        const double share = needle_share(n, o.x + r * d.x, o.z + r * d.z, back);
+        const double seen = std::min(share * n.slab_mm / (2 * n.radius_mm), 1.0);
+        if (!(seen > 0)) {
+            others += t.past[number];
+            continue;
+        }
+        const double cosine = n.axis.x * d.x + n.axis.z * d.z;
+        const NeedleMake& make = *n.make;
+        const double mirror = std::exp2(-cosine * cosine / (make.lobe_sin * make.lobe_sin));
+        const double sine = std::sqrt(std::max(1 - cosine * cosine, 0.01));
+        const double faces = std::clamp(-(n.bevel.x * d.x + n.bevel.z * d.z) / sine, -1.0, 1.0);
+        const double tip = make.tip_away + (make.tip_towards - make.tip_away) * 0.5 * (1 + faces);
+        const double base = make.rough + (tip - make.rough) * needle_tip_part(back);
+        const double i =
+            kNeedleGain * n.echo * seen * (base + (1 - base) * mirror) * p.row.interface_scale;
+        t.needle_lines[number] = 0;
+        p.re += i;
+        t.past[number] -=
+            kNeedleShadowLog2 * seen * std::min(in.geometry.step_mm / (2 * n.radius_mm), 1.0);
+        others += t.past[number];
+        t.needle_tail[number] =
+            std::max(t.needle_tail[number], kNeedleTail * n.tail * kNeedleGain * n.echo * seen *
+                                                (make.rough + mirror) * light);
+    }
+    t.needle_light = others;
 }
 
 // Power of the tails at a depth; moves on to the next line of the reverberation.
@@ -129,11 +141,14 @@ double tail_power(const ReferenceInput& in, const Row& row, BeamLight& t) {
             t.reverb *= kReverbLoss;
         }
     }
-    if (in.frame.needle == nullptr) return power;
-    t.needle_lines += in.geometry.step_mm / (2 * in.frame.needle->radius_mm);
-    const double off = 2 * (t.needle_lines - std::floor(t.needle_lines)) - 1;
-    const double line = t.needle_tail * (kBetweenLines + (1 - kBetweenLines) * off * off);
-    return power + line * line;
+    for (std::size_t i = 0; i < in.frame.needles.size(); ++i) {
+        double& lines = t.needle_lines[i];
+        lines += in.geometry.step_mm / (2 * in.frame.needles[i].radius_mm);
+        const double off = 2 * (lines - std::floor(lines)) - 1;
+        const double line = t.needle_tail[i] * (kBetweenLines + (1 - kBetweenLines) * off * off);
+        power += line * line;
+    }
+    return power;
 }
 
 // One frame's beams.
