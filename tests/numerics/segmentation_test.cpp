@@ -10,9 +10,12 @@
 #include "pipeline/segmentation/distance/signed_distance.h"
 #include "pipeline/segmentation/level_set_smoothing.h"
 #include "pipeline/segmentation/smooth_labels.h"
+#include "support/hard_case.h"
 
 namespace sonocase::numerics {
 namespace {
+
+using testing::HardCase;
 
 LabelVolume blank(Int3 size, Vector3 spacing_mm) {
     LabelVolume v;
@@ -140,6 +143,7 @@ LabelVolume blobs(testing::Random& random) {
 }
 
 TEST(JointSmoothingNumerics, VolumesAreKeptAndNothingIsLost) {
+    HardCase change("change of a label's volume, joint smoothing", HardCase::at_most, 0.02, "");
     testing::Random random(2);
     for (int draw = 0; draw < 4; ++draw) {
         const LabelVolume v = blobs(random);
@@ -149,7 +153,7 @@ TEST(JointSmoothingNumerics, VolumesAreKeptAndNothingIsLost) {
         for (auto voxel : v.voxels) before[voxel] += 1;
         for (auto voxel : out->volume.voxels) after[voxel] += 1;
         for (std::size_t label = 1; label < 3; ++label)
-            EXPECT_NEAR(after[label] / before[label], 1, 0.02) << label;
+            change.see(std::abs(after[label] / before[label] - 1));
     }
 }
 

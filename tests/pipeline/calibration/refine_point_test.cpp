@@ -8,10 +8,13 @@
 
 #include "pipeline/calibration/touched_points.h"
 #include "support/calibration_motion.h"
+#include "support/hard_case.h"
 #include "support/read_recording.h"
 
 namespace sonocase::pipeline {
 namespace {
+
+using testing::HardCase;
 
 using testing::pivot_recording;
 using testing::PivotMotion;
@@ -27,6 +30,7 @@ TEST(RefinePoint, ExactReadingsStayExact) {
 }
 
 TEST(RefinePoint, UndoesTheBiasThatNoisyRotationsGiveASmallTilt) {
+    HardCase ratio("tip refined, over the linear answer's error", HardCase::at_most, 0.7, "");
     // 6 degrees of tilt and 0.6 degrees of rotation noise, many poses: the linear answer is biased.
     Random random(2);
     double linear = 0, refined = 0;
@@ -50,7 +54,7 @@ TEST(RefinePoint, UndoesTheBiasThatNoisyRotationsGiveASmallTilt) {
         refined += norm(out.tip_mm - motion.tip_mm) / 12;
     }
     std::printf("mean tip error: linear %.2f mm, refined %.2f mm\n", linear, refined);
-    EXPECT_LT(refined, 0.7 * linear);
+    ratio.see(refined / linear);
 }
 
 TEST(RefinePoint, StaysNearThePublishedAnswer) {

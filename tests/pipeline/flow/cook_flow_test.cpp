@@ -15,9 +15,12 @@
 #include "formats/flow/flow_velocity.h"
 #include "pipeline/flow/flow_reference.h"
 #include "pipeline/flow/vessel_parts.h"
+#include "support/hard_case.h"
 
 namespace sonocase::pipeline {
 namespace {
+
+using testing::HardCase;
 
 // A block of 80 x 80 x 120 mm; inside(p) gives the palette index.
 LabelVolume block(double voxel_mm,
@@ -135,6 +138,7 @@ TEST(CookFlow, AForkConservesFlowAtEveryInstantAndRunsTowardsTheLegs) {
 }
 
 TEST(CookFlow, VeinsRunTheOtherWayAndCarryTheSameFlow) {
+    HardCase lost("flow through a section of a turned vessel, off", HardCase::at_most, 0.04, "");
     LabelVolume labels = fork();
     for (std::uint8_t& v : labels.voxels) v = v >= 3 ? 6 : v;
     const auto cooked = cook_flow(labels);
@@ -154,7 +158,7 @@ TEST(CookFlow, VeinsRunTheOtherWayAndCarryTheSameFlow) {
             for (double y = -12; y < 12; y += step)
                 flow +=
                     step * step * dot(reader.velocity(middle.centre + x * a + y * b, 0.2, 0.5), d);
-        EXPECT_NEAR(flow / 1000, flow_ml_s(v, 0.2, 0.5), 0.04 * flow_ml_s(v, 0.2, 0.5));
+        lost.see(std::abs(flow / 1000 / flow_ml_s(v, 0.2, 0.5) - 1));
     }
     EXPECT_EQ(upwards, 3);
 }
@@ -162,6 +166,7 @@ TEST(CookFlow, VeinsRunTheOtherWayAndCarryTheSameFlow) {
 // Two side veins that join a wide trunk 4 mm from each other: between them there is no room for a
 // course, and the trunk must go on nevertheless.
 TEST(CookFlow, ATrunkGoesOnBeyondTwoSideVesselsThatJoinItCloseTogether) {
+    HardCase lost("flow lost where vessels join", HardCase::at_most, 1e-5, "");
     std::vector<Label> palette = kPalette;
     palette[3].name = "inferior_vena_cava";
     palette[4].name = "hepatic_vein_3mm";
@@ -176,7 +181,7 @@ TEST(CookFlow, ATrunkGoesOnBeyondTwoSideVesselsThatJoinItCloseTogether) {
     });
     const auto cooked = cook_flow(labels);
     ASSERT_TRUE(cooked);
-    EXPECT_LT(worst_balance(cooked->field), 1e-5);
+    lost.see(worst_balance(cooked->field));
     const FlowReader reader(cooked->field, 1);
     for (double z = -54; z <= 54; z += 2)
         EXPECT_GT(norm(reader.velocity(Point3{0, 0, z}, 0.2, 0.5)), 1) << z;

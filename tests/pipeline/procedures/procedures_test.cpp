@@ -18,10 +18,13 @@
 #include "formats/scoring/draw_attempt.h"
 #include "formats/scoring/procedure_run.h"
 #include "pipeline/procedures/analytic_anatomy.h"
+#include "support/hard_case.h"
 #include "support/paths.h"
 
 namespace sonocase {
 namespace {
+
+using testing::HardCase;
 
 bool in_the_neck(const std::string& procedure) {
     return procedure == "central-line" || procedure == "jugular-across";
@@ -442,10 +445,11 @@ TEST(Procedures, WhatGoesWrongInTheNeckIsNamed) {
 }
 
 TEST(Procedures, WhatLeavesTheCollectionIsWhatItHeld) {
+    HardCase off("volume that left, off what it held", HardCase::at_most, 1e-9, "ml");
     const Exercise exercise = procedure_called("abscess-drainage");
     const ProcedureResult result = judge(play(exercise), exercise);
     const double held_ml = 4.0 / 3 * kPi * 14 * 14 * 14 / 1000;
-    EXPECT_NEAR(result.aspirated_ml + result.drained_ml, held_ml, 1e-9);
+    off.see(std::abs(result.aspirated_ml + result.drained_ml - held_ml));
     EXPECT_EQ(result.injected_ml, 6);
 }
 
@@ -532,6 +536,7 @@ TEST(Procedures, AWireOutsideTheBodyOrTheVesselIsNoneInIt) {
 }
 
 TEST(Procedures, AnInjectionIntoBoneIsLostAndOneUnderItIsKept) {
+    HardCase off("injected volume behind bone, off", HardCase::at_most, 1e-9, "ml");
     Held held("liver-biopsy");
     const testing::AnalyticAnatomy& body = held.body();
     // A rib on the way in from the right flank, with tissue that takes fluid 3 mm behind it.
@@ -559,7 +564,7 @@ TEST(Procedures, AnInjectionIntoBoneIsLostAndOneUnderItIsKept) {
     EXPECT_EQ(state.injected_ml, 3);
     ASSERT_EQ(state.pool_count, 1);
     const SceneChange::Pool pool = held.machine().scene().pools[0];
-    EXPECT_NEAR(4.0 / 3 * kPi * std::pow(pool.radius_mm, 3) / 1000, 3, 1e-9);
+    off.see(std::abs(4.0 / 3 * kPi * std::pow(pool.radius_mm, 3) / 1000 - 3));
 }
 
 // What was injected before the vein pushes it away from the needle, in the picture and for the tip.
