@@ -2,9 +2,9 @@
 
 #include <pybind11/stl.h>
 
+#include "array_values.h"
 #include "bindings.h"
 #include "formats/exercise/exercise.h"
-#include "numpy_values.h"
 
 namespace sonocase::python {
 namespace {
@@ -50,14 +50,6 @@ void bind_probe(py::module_& module) {
             return "<sonocase.Probe " + std::string(probe_shape_name(p.shape)) + ", " +
                    std::to_string(static_cast<int>(p.depth_mm)) + " mm deep>";
         });
-}
-
-// A pose whose beam and lateral axis are given, as scripted sweeps have it.
-Rigid pose_along(Point3 face, Vector3 beam, Vector3 lateral) {
-    const Vector3 z = normalized(beam);
-    Vector3 x = lateral - dot(lateral, z) * z;
-    x = norm(x) > 1e-6 ? normalized(x) : any_perpendicular(z);
-    return {Matrix3::from_columns(x, cross(z, x), z), face - Point3{}};
 }
 
 void bind_targets(py::module_& module) {

@@ -11,16 +11,14 @@
 
 #include <pybind11/stl.h>
 
+#include "array_values.h"
 #include "bind_truth.h"
 #include "bindings.h"
 #include "doppler_values.h"
 #include "formats/files/load_save.h"
 #include "frame_renderer.h"
-#include "numpy_values.h"
 
 namespace sonocase::python {
-
-using Bytes = py::array_t<std::uint8_t, py::array::c_style>;
 
 void set_scalars(double time_s, std::int64_t frame, double gain_db, runtime::FrameInput& input);
 void set_press(double press_mm, runtime::FrameInput& input);
@@ -35,15 +33,6 @@ std::vector<FrameTask> batch_tasks(py::handle poses,
 void press_batch(const py::object& press_mm, std::vector<FrameTask>& tasks);
 // None, or a pair or None per frame.
 void dent_batch(py::handle dents, std::vector<FrameTask>& tasks);
-
-// out itself, if it is a writeable array of bytes of this shape.
-py::object checked_out(const py::object& out, const std::vector<py::ssize_t>& shape);
-
-namespace {
-
-using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
-
-}  // namespace
 
 void set_scalars(double time_s, std::int64_t frame, double gain_db, runtime::FrameInput& input) {
     if (!std::isfinite(time_s)) throw py::value_error("time_s: not finite");
@@ -61,12 +50,12 @@ void set_press(double press_mm, runtime::FrameInput& input) {
 }
 
 void press_batch(const py::object& press_mm, std::vector<FrameTask>& tasks) {
-    const Doubles values(numbers_from(press_mm, "press_mm"));
-    const bool one = values.ndim() == 0;
-    if (!one && !(values.ndim() == 1 && values.shape(0) == static_cast<py::ssize_t>(tasks.size())))
+    const Numbers given = numbers_from(press_mm, "press_mm");
+    const bool one = given.shape.empty();
+    if (!one && given.shape != Shape{static_cast<py::ssize_t>(tasks.size())})
         throw py::value_error("press_mm: give one number, or one per pose");
     for (std::size_t n = 0; n < tasks.size(); ++n)
-        set_press(values.data()[one ? 0 : n], tasks[n].input);
+        set_press(given.values[one ? 0 : n], tasks[n].input);
 }
 
 void dent_batch(py::handle dents, std::vector<FrameTask>& tasks) {
@@ -80,51 +69,34 @@ void dent_batch(py::handle dents, std::vector<FrameTask>& tasks) {
     }
 }
 
-py::object checked_out(const py::object& out, const std::vector<py::ssize_t>& shape) {
-    if (!py::isinstance<Bytes>(out))
-        throw py::type_error("out: give a C-contiguous array of dtype uint8");
-    const Bytes a = py::reinterpret_borrow<Bytes>(out);
-    bool fits = a.ndim() == static_cast<py::ssize_t>(shape.size());
-    std::string wanted;
-    for (std::size_t i = 0; i < shape.size(); ++i) {
-        fits = fits && a.shape(static_cast<py::ssize_t>(i)) == shape[i];
-        wanted += (i > 0 ? ", " : "") + std::to_string(shape[i]);
-    }
-    if (!fits) throw py::value_error("out: give an array of shape (" + wanted + ")");
-    if (!a.writeable()) throw py::value_error("out: the array is read-only");
-    return out;
-}
-
 std::vector<FrameTask> batch_tasks(py::handle poses,
                                    py::handle needles,
                                    py::handle times_s,
                                    std::int64_t first_frame,
                                    double gain_db) {
-    const py::array a = numbers_from(poses, "poses");
-    if (a.ndim() != 3 || a.shape(1) != 4 || a.shape(2) != 4)
+    const Numbers rows = numbers_from(poses, "poses");
+    if (rows.shape.size() != 3 || rows.shape[1] != 4 || rows.shape[2] != 4)
         throw py::value_error("poses: give an array of shape (n, 4, 4), rigid motions in mm");
-    const Doubles rows(a);
-    std::vector<FrameTask> tasks(rows.shape(0));
-    std::optional<Doubles> times;
+    std::vector<FrameTask> tasks(rows.shape[0]);
+    std::optional<Numbers> times;
     if (!times_s.is_none()) {
-        times = Doubles(numbers_from(times_s, "times_s"));
-        if (times->ndim() != 1 || times->shape(0) != rows.shape(0))
+        times = numbers_from(times_s, "times_s");
+        if (times->shape != Shape{rows.shape[0]})
             throw py::value_error("times_s: give one number per pose");
     }
     py::sequence needle_of;
     if (!needles.is_none()) {
         needle_of = py::reinterpret_borrow<py::sequence>(needles);
-        if (!PySequence_Check(needles.ptr()) ||
-            py::len(needle_of) != static_cast<std::size_t>(rows.shape(0)))
+        if (!PySequence_Check(needles.ptr()) || py::len(needle_of) != tasks.size())
             throw py::value_error("needles: give one per pose; None for no needle");
     }
     for (std::size_t n = 0; n < tasks.size(); ++n) {
         runtime::FrameInput& input = tasks[n].input;
         input.mannequin_from_probe =
-            rigid_from(rows.data(static_cast<py::ssize_t>(n)), "poses[" + std::to_string(n) + "]");
+            rigid_from(rows.values.data() + 16 * n, "poses[" + std::to_string(n) + "]");
         if (!needles.is_none()) set_needle(py::object(needle_of[n]), input);
-        set_scalars(times ? times->at(static_cast<py::ssize_t>(n)) : 0,
-                    first_frame + static_cast<std::int64_t>(n), gain_db, input);
+        set_scalars(times ? times->values[n] : 0, first_frame + static_cast<std::int64_t>(n),
+                    gain_db, input);
     }
     return tasks;
 }
@@ -146,6 +118,24 @@ class Turn {
 
   private:
     std::atomic<bool>& busy_;
+};
+
+// Where pictures go: the caller's array, or a new one.
+struct Pixels {
+    Pixels(const py::object& out, const Shape& shape) {
+        if (out.is_none()) {
+            const auto made = new_array<std::uint8_t>(shape);
+            object = made.object;
+            data = made.data;
+        } else {
+            view = writeable_bytes(out, shape);
+            object = out;
+            data = static_cast<std::uint8_t*>(view->data());
+        }
+    }
+    std::optional<ArrayView> view;  // holds the caller's memory in place
+    py::object object;
+    std::uint8_t* data;
 };
 
 class PyRenderer {
@@ -176,10 +166,8 @@ class PyRenderer {
         set_dent(dent, task.input, "dent");
         mode_ = doppler_mode(mode);
         if (mode_ != runtime::DopplerMode::off) return render_doppler(task, doppler, out);
-        py::object picture = out.is_none() ? py::object(Bytes({height(), width()}))
-                                           : checked_out(out, {height(), width()});
-        task.pixels = {static_cast<Bytes&>(picture).mutable_data(),
-                       static_cast<std::size_t>(width() * height())};
+        const Pixels picture(out, {height(), width()});
+        task.pixels = {picture.data, static_cast<std::size_t>(width() * height())};
         const Turn turn(busy_);
         check(usable(renderer_->opened()));
         {
@@ -190,7 +178,7 @@ class PyRenderer {
         contact_ = task.status != runtime::FrameStatus::no_contact;
         press_ = task.press;
         last_ = task.input;
-        return picture;
+        return picture.object;
     }
 
     // Box, gate and cursor on the widest vessel of a plane.
@@ -240,14 +228,12 @@ class PyRenderer {
         press_batch(press_mm, tasks);
         dent_batch(dents, tasks);
         const auto count = static_cast<py::ssize_t>(tasks.size());
-        py::object pictures = out.is_none() ? py::object(Bytes({count, height(), width()}))
-                                            : checked_out(out, {count, height(), width()});
-        std::uint8_t* to = static_cast<Bytes&>(pictures).mutable_data();
+        const Pixels pictures(out, {count, height(), width()});
         const std::size_t area = width() * height();
         TruthArrays arrays;
         if (truth) arrays = TruthArrays::make(*truth, count, height(), width());
         for (std::size_t n = 0; n < tasks.size(); ++n) {
-            tasks[n].pixels = {to + n * area, area};
+            tasks[n].pixels = {pictures.data + n * area, area};
             tasks[n].wants_truth = truth.has_value();
             tasks[n].planes = arrays.planes(n, area);
         }
@@ -265,12 +251,12 @@ class PyRenderer {
         check(usable(renderer_->opened()));
         if (!tasks.empty()) last_ = tasks.back().input;
         if (!tasks.empty()) press_ = tasks.back().press;
-        if (!truth) return pictures;
+        if (!truth) return pictures.object;
         py::list facts;
         for (const FrameTask& task : tasks)
             facts.append(
                 facts_of(task.truth, renderer_->opened().bundle->labels, renderer_->exercise()));
-        return py::make_tuple(pictures, arrays, facts);
+        return py::make_tuple(pictures.object, arrays, facts);
     }
 
     const runtime::FrameInput& last() const {
@@ -297,11 +283,10 @@ class PyRenderer {
         settings.mode = mode_;
         if (last_) runtime::add_probe_motion(*last_, task.input);
         const py::ssize_t rows = runtime::doppler_rows(mode_, static_cast<int>(height()));
-        py::object picture = out.is_none() ? py::object(Bytes({rows, width(), py::ssize_t{3}}))
-                                           : checked_out(out, {rows, width(), 3});
+        const Pixels picture(out, {rows, width(), 3});
         std::vector<std::uint8_t> grey(width() * height());
         task.pixels = grey;
-        const std::span<std::uint8_t> rgb(static_cast<Bytes&>(picture).mutable_data(),
+        const std::span<std::uint8_t> rgb(picture.data,
                                           static_cast<std::size_t>(3 * width() * rows));
         {
             const py::gil_scoped_release free_to_run;
@@ -312,7 +297,7 @@ class PyRenderer {
         contact_ = task.status != runtime::FrameStatus::no_contact;
         press_ = task.press;
         last_ = task.input;
-        return picture;
+        return picture.object;
     }
 
     std::unique_ptr<FrameRenderer> renderer_;

@@ -40,6 +40,9 @@ Status usable(const OpenedCase& opened);
 // The exercise of that name; "" means the first, and where the bundle holds none, a free scan.
 Result<Exercise> exercise_named(const OpenedCase& opened, const std::string& name);
 
+// How far the skin is looked for, and over which ball its normal is averaged, unless said.
+constexpr double kSkinReachMm = 60, kSkinRadiusMm = 12;
+
 // Where one frame of a batch goes.
 struct FrameTask {
     runtime::FrameInput input;

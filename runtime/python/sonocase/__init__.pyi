@@ -18,6 +18,21 @@ NeedleArray = Union[npt.ArrayLike, tuple[npt.ArrayLike, npt.ArrayLike], None]
 
 class Error(Exception): ...
 
+# What stands for NumPy's arrays below where NumPy cannot be imported.
+class Array:
+    shape: tuple[int, ...]
+    dtype: str
+    nbytes: int
+    def __init__(self, shape: Sequence[int], dtype: str = ...) -> None: ...
+    def __len__(self) -> int: ...
+    def __getitem__(self, index: Union[int, tuple[int, ...]]) -> Any: ...
+    def tolist(self) -> Any: ...
+    @property
+    def __array_interface__(self) -> dict[str, Any]: ...
+    def __dlpack__(self, *, stream: None = ..., max_version: Optional[tuple[int, int]] = ...,
+                   dl_device: Optional[tuple[int, int]] = ..., copy: Optional[bool] = ...) -> Any: ...
+    def __dlpack_device__(self) -> tuple[int, int]: ...
+
 class Label:
     name: str
     tissue: str
@@ -109,7 +124,7 @@ class Renderer:
     def render(self, pose: PoseArray, needle: NeedleArray = ..., time_s: float = ..., *,
                frame: int = ..., gain_db: float = ..., press_mm: float = ...,
                dent: Optional[npt.ArrayLike] = ...,
-               out: Optional[npt.NDArray[np.uint8]] = ..., mode: str = ...,
+               out: Any = ..., mode: str = ...,
                doppler: dict[str, Any] = ...) -> npt.NDArray[np.uint8]: ...
     def aimed(self, pose: PoseArray) -> dict[str, float]: ...
     @property
@@ -119,7 +134,7 @@ class Renderer:
                      times_s: Optional[npt.ArrayLike] = ..., *, first_frame: int = ...,
                      gain_db: float = ..., press_mm: npt.ArrayLike = ...,
                      dents: Optional[Sequence[Optional[npt.ArrayLike]]] = ...,
-                     out: Optional[npt.NDArray[np.uint8]] = ...,
+                     out: Any = ...,
                      threads: int = ..., truth: Optional[Sequence[str]] = ...) -> Any: ...
     def truth(self, planes: Iterable[str] = ...) -> tuple[TruthPlanes, dict[str, Any]]: ...
 
