@@ -22,6 +22,18 @@ Vector3 triple(py::handle value, const char* name) {
 
 }  // namespace
 
+std::string absolute_path(const std::string& path) {
+    return py::cast<std::string>(py::module_::import("os.path").attr("abspath")(path));
+}
+
+double in_range(double value, const char* name, double min, double max) {
+    if (value >= min && value <= max) return value;
+    char text[160];
+    std::snprintf(text, sizeof text, "%s: %.6g is out of range: give %.6g to %.6g", name, value,
+                  min, max);
+    throw py::value_error(text);
+}
+
 Rigid rigid_from(const double* rows, const std::string& name) {
     Rigid pose;
     bool finite = true;

@@ -30,6 +30,12 @@ inline void check(const Status& status) {
     if (!status) throw OutsideError(status.error());
 }
 
+// As pickles hold it, for a process that stands elsewhere.
+std::string absolute_path(const std::string& path);
+
+// Raises ValueError, "depth_mm: -3 is out of range: give 1 to 500".
+double in_range(double value, const char* name, double min, double max);
+
 // name: of the argument, for messages. Raise TypeError where `value` is no array of numbers and
 // ValueError where its shape or its numbers do not fit.
 Rigid rigid_from(py::handle value, const char* name);           // 4 x 4, last row 0 0 0 1

@@ -64,7 +64,7 @@ std::vector<int> labels_at(const OpenedCase& opened, py::handle points) {
 
 std::string score_text(const OpenedCase& opened,
                        const std::string& session_path,
-                       const std::optional<Exercise>& given) {
+                       const std::optional<CaseExercise>& given) {
     const CaseBundle& bundle = bundle_of(opened);
     const py::gil_scoped_release free_to_run;
     const Sequence sequence = value_of(load_recording_file(session_path));
@@ -72,7 +72,7 @@ std::string score_text(const OpenedCase& opened,
         value_of(session_from_sequence(sequence, guess_names(sequence), session_path));
     (void)value_of(check_session(session, session_path));
     const Exercise exercise =
-        given ? *given : value_of(exercise_named(opened, session.header.exercise));
+        given ? Exercise(*given) : value_of(exercise_named(opened, session.header.exercise));
     const CaseAnatomy anatomy(opened.bundle, breathing_shown(exercise, session.header));
     return score_json(score_session(session, exercise, &anatomy, bundle.labels), exercise);
 }
@@ -141,11 +141,17 @@ void bind_case(py::module_& module) {
         .def_property_readonly(
             "labels", [](const OpenedCase& c) { return bundle_of(c).labels; },
             "List of Label; an index in truth arrays is an index into it, 0 is outside the body.")
-        .def_property_readonly("exercises", [](const OpenedCase& c) { return c.exercises; })
+        .def_property_readonly("exercises",
+                               [](const OpenedCase& c) {
+                                   std::vector<CaseExercise> exercises;
+                                   for (const Exercise& e : c.exercises)
+                                       exercises.push_back({e, c.path});
+                                   return exercises;
+                               })
         .def(
             "exercise",
             [](const OpenedCase& c, const std::string& name) {
-                return value_of(exercise_named(c, name));
+                return CaseExercise{value_of(exercise_named(c, name)), c.path};
             },
             "name"_a = "", "By name; the first by default.")
         .def_property_readonly(
@@ -170,6 +176,12 @@ void bind_case(py::module_& module) {
         .def("skin_normal", skin_normal, "point"_a, "radius_mm"_a = kSkinRadiusMm,
              "Outward unit normal (3,) of the skin, averaged over a ball, or None.")
         .def("_score", score_text, "session"_a, "exercise"_a = py::none())
+        .def(py::pickle(
+            [](const OpenedCase& c) {
+                check(usable(c));
+                return py::make_tuple(absolute_path(c.path));
+            },
+            [](const py::tuple& t) { return value_of(open_case(py::cast<std::string>(t[0]))); }))
         .def("__repr__", [](const OpenedCase& c) {
             return "<sonocase.Case " + c.path + (c.closed ? ", closed>" : ">");
         });

@@ -31,6 +31,11 @@ struct OpenedCase {
     std::atomic<bool> closed{false};
 };
 
+// An exercise and the bundle that holds it: probe and needle may have changed since, nothing else.
+struct CaseExercise : Exercise {
+    std::string case_path;
+};
+
 // Errors: a file that cannot be read or is not a bundle.
 Result<std::shared_ptr<OpenedCase>> open_case(const std::string& path);
 

@@ -56,6 +56,8 @@ class Needle:
     gauge: float
     diameter_mm: float
     length_mm: float
+    def __init__(self, *, make: str = ..., gauge: float = ..., diameter_mm: float = ...,
+                 length_mm: float = ...) -> None: ...
 
 class Target:
     name: str
@@ -112,17 +114,24 @@ class TruthPlanes:
 
 class Renderer:
     size: tuple[int, int]
+    closed: bool
     contact: bool
     press: dict[str, Any]
+    skipped_effects: dict[str, str]
     exercise: Exercise
     mm_per_px: float
     origin_px: tuple[float, float]
     def __init__(self, case: Case, exercise: Union[str, Exercise, None] = ...,
-                 probe: Optional[Probe] = ..., *, model: str = ..., machine: str = ...,
-                 effects: Union[str, Sequence[str], None] = ..., size: tuple[int, int] = ...,
-                 seed: int = ..., renderer: str = ...) -> None: ...
+                 probe: Optional[Probe] = ..., needle: Optional[Needle] = ..., *, model: str = ...,
+                 machine: str = ..., effects: Union[str, Sequence[str], None] = ...,
+                 size: tuple[int, int] = ..., seed: int = ..., renderer: str = ...,
+                 scanlines: int = ..., samples: int = ..., looks: int = ...) -> None: ...
+    def close(self) -> None: ...
+    def __enter__(self) -> Renderer: ...
+    def __exit__(self, *args: Any) -> None: ...
     def render(self, pose: PoseArray, needle: NeedleArray = ..., time_s: float = ..., *,
-               frame: int = ..., gain_db: float = ..., press_mm: float = ...,
+               frame: int = ..., gain_db: float = ..., dynamic_range_db: float = ...,
+               press_mm: float = ...,
                dent: Optional[npt.ArrayLike] = ...,
                out: Any = ..., mode: str = ...,
                doppler: dict[str, Any] = ...) -> npt.NDArray[np.uint8]: ...
@@ -132,7 +141,8 @@ class Renderer:
     # With truth: (pictures, TruthPlanes, list of facts).
     def render_batch(self, poses: npt.ArrayLike, needles: Optional[Sequence[NeedleArray]] = ...,
                      times_s: Optional[npt.ArrayLike] = ..., *, first_frame: int = ...,
-                     gain_db: float = ..., press_mm: npt.ArrayLike = ...,
+                     gain_db: float = ..., dynamic_range_db: float = ...,
+                     press_mm: npt.ArrayLike = ...,
                      dents: Optional[Sequence[Optional[npt.ArrayLike]]] = ...,
                      out: Any = ...,
                      threads: int = ..., truth: Optional[Sequence[str]] = ...) -> Any: ...
