@@ -64,15 +64,16 @@ std::vector<int> labels_at(const OpenedCase& opened, py::handle points) {
 
 std::string score_text(const OpenedCase& opened,
                        const std::string& session_path,
-                       const std::optional<CaseExercise>& given) {
+                       const CaseExercise* given) {
     const CaseBundle& bundle = bundle_of(opened);
     const py::gil_scoped_release free_to_run;
     const Sequence sequence = value_of(load_recording_file(session_path));
     const Session session =
         value_of(session_from_sequence(sequence, guess_names(sequence), session_path));
     (void)value_of(check_session(session, session_path));
+    const Exercise* chosen = given;  // null: that of the recording
     const Exercise exercise =
-        given ? Exercise(*given) : value_of(exercise_named(opened, session.header.exercise));
+        chosen != nullptr ? *chosen : value_of(exercise_named(opened, session.header.exercise));
     const CaseAnatomy anatomy(opened.bundle, breathing_shown(exercise, session.header));
     return score_json(score_session(session, exercise, &anatomy, bundle.labels), exercise);
 }
