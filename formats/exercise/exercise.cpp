@@ -44,30 +44,27 @@ const std::vector<std::string>& mode_names() {
 void read_probe(const TomlTable& table, Probe& probe) {
     if (const auto shape = table.choice("shape", shape_names()))
         probe.shape = static_cast<ProbeShape>(*shape);
-    table.number("radius_mm", probe.radius_mm, 1, 1000);
     double degrees = 0;
     if (table.number("field_of_view_deg", degrees, 1, 179))
         probe.field_of_view_rad = degrees * kPi / 180;
-    if (table.number("field_of_view_rad", probe.field_of_view_rad, 0.01, 3.13) && degrees != 0) {
-        table.add_fault("field_of_view_rad", "is given twice, in degrees and in radians",
-                        "keep one");
+    for (const ProbeNumber& number : probe_numbers()) {
+        const bool given = table.number(number.name, probe.*number.value, number.min, number.max);
+        if (given && degrees != 0 && number.value == &Probe::field_of_view_rad) {
+            table.add_fault("field_of_view_rad", "is given twice, in degrees and in radians",
+                            "keep one");
+        }
     }
-    table.number("width_mm", probe.width_mm, 1, 300);
-    table.number("depth_mm", probe.depth_mm, 1, 500);
-    table.number("frequency_mhz", probe.frequency_mhz, 0.5, 50);
-    table.number("focus_mm", probe.focus_mm, 1, 500);
-    table.number("elevation_mm", probe.elevation_mm, 0, 50);
     table.finish();
 }
 
 void read_needle(const TomlTable& table, NeedleModel& needle) {
-    const bool gauge = table.number("gauge", needle.gauge, 6, 34);
-    const bool diameter = table.number("diameter_mm", needle.diameter_mm, 0, 10);
+    const bool gauge = table.number("gauge", needle.gauge, kMinGauge, kMaxGauge);
+    const bool diameter = table.number("diameter_mm", needle.diameter_mm, 0, kMaxNeedleDiameterMm);
     if (const auto make = table.choice("make", needle_make_names())) {
         needle.make = &needle_makes()[*make];
         if (!gauge && !diameter) needle.diameter_mm = needle.make->diameter_mm;
     }
-    table.number("length_mm", needle.length_mm, 1, 1000);
+    table.number("length_mm", needle.length_mm, 1, kMaxNeedleLengthMm);
     table.number("slab_mm", needle.slab_mm, 0, 50);
     table.number("tip_visibility", needle.tip_visibility, 0, 1);
     table.number("shaft_visibility", needle.shaft_visibility, 0, 1);
@@ -478,6 +475,18 @@ double half_face_mm(const Probe& probe) {
     return probe.shape == ProbeShape::curvilinear
                ? probe.radius_mm * std::sin(0.5 * probe.field_of_view_rad)
                : 0.5 * probe.width_mm;
+}
+
+std::span<const ProbeNumber> probe_numbers() {
+    static constexpr ProbeNumber kNumbers[] = {
+        {"radius_mm", &Probe::radius_mm, 1, 1000},
+        {"field_of_view_rad", &Probe::field_of_view_rad, 0.01, 3.13},
+        {"width_mm", &Probe::width_mm, 1, 300},
+        {"depth_mm", &Probe::depth_mm, 1, 500},
+        {"frequency_mhz", &Probe::frequency_mhz, 0.5, 50},
+        {"focus_mm", &Probe::focus_mm, 1, 500},
+        {"elevation_mm", &Probe::elevation_mm, 0, 50}};
+    return kNumbers;
 }
 
 double needle_diameter_mm(const NeedleModel& needle) {

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cmath>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -33,9 +34,20 @@ struct Probe {
     double elevation_mm = 3;  // full beam thickness at the focus
 };
 
+// A probe's numbers as files name them, with their limits.
+struct ProbeNumber {
+    const char* name;
+    double Probe::*value;
+    double min, max;
+};
+std::span<const ProbeNumber> probe_numbers();
+
 // From the middle of the picture to the end of the face, where the orientation mark stands: beside
 // the end that x points to.
 double half_face_mm(const Probe& probe);
+
+inline constexpr double kMinGauge = 6, kMaxGauge = 34;  // the smaller, the thicker
+inline constexpr double kMaxNeedleDiameterMm = 10, kMaxNeedleLengthMm = 1000;
 
 struct NeedleModel {
     const NeedleMake* make = &needle_makes().front();  // how it shows; never null

@@ -443,8 +443,7 @@ int verb_build(int argc, char** argv) {
         ->expected(1, 100);
     app.add_option("--set", options.overrides.sets, "Set an option of a stage; may be repeated")
         ->type_name("SECTION.KEY=VALUE")
-        ->expected(1)
-        ->take_all();
+        ->allow_extra_args(false);
     app.add_option("--preset", options.overrides.preset,
                    "One of " + preset_names(built_in_stages()) + "; the recipe's own by default")
         ->type_name("NAME");

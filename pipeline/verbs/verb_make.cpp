@@ -51,8 +51,7 @@ int verb_make(int argc, char** argv) {
     app.add_option("--preset", options.preset, "draft, balanced or accurate")->type_name("NAME");
     app.add_option("--set", options.sets, "Set an option of a stage; may be repeated")
         ->type_name("SECTION.KEY=VALUE")
-        ->expected(1)
-        ->take_all();
+        ->allow_extra_args(false);
     app.add_flag("--accept-faults", options.accept_faults,
                  "Go on, and publish, where the check finds faults");
     app.add_option("--program", options.publish.program_folder,

@@ -2,6 +2,7 @@
 
 // sonocase plan and cache: what a build farm asks before and after its jobs.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 
@@ -20,6 +21,7 @@ int verb_plan(int argc, char** argv) {
     std::vector<std::string> recipes;
     std::string folder;
     RecipeOverrides overrides;
+    bool dry = false;
     app.add_option("RECIPE", recipes, "case.toml or its folder")->required();
     app.add_option("-o,--output", folder, "The farm's folder; plan.json is written there")
         ->type_name("DIR")
@@ -28,29 +30,42 @@ int verb_plan(int argc, char** argv) {
         ->type_name("DIR");
     app.add_option("--set", overrides.sets, "Set an option of a stage; may be repeated")
         ->type_name("SECTION.KEY=VALUE")
-        ->expected(1)
-        ->take_all();
+        ->allow_extra_args(false);
     app.add_option("--preset", overrides.preset, "draft, balanced or accurate")->type_name("NAME");
+    app.add_flag("--dry-run", dry,
+                 "Write nothing: say what is stale and why, and what it will take");
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
     if (!overrides.data.empty()) overrides.data = std::filesystem::absolute(overrides.data);
-    remove_leftovers(folder);
-    auto plans = plan_cases(recipes, overrides, folder);
+    if (!dry) remove_leftovers(folder);
+    auto plans = plan_cases(recipes, overrides, folder, {.dry = dry});
     if (!plans) return fail("plan", plans.error());
-    const std::string path = (std::filesystem::path(folder) / "plan.json").string();
-    if (auto status = write_file(path, plan_json(*plans, overrides)); !status)
-        return fail("plan", status.error());
+    if (dry) {
+        std::printf("%s", plan_text(*plans).c_str());
+    } else {
+        const std::string path = (std::filesystem::path(folder) / "plan.json").string();
+        if (auto status = write_file(path, plan_json(*plans, overrides)); !status)
+            return fail("plan", status.error());
+    }
+    double processor_s = 0;
+    int memory_mb = 0;
     std::size_t bad = 0, waiting = 0;
     for (const CasePlan& plan : *plans) {
         if (plan.error.empty())
             waiting += plan.done ? 0 : 1;
         else
             ++bad;
-        if (!plan.error.empty())
+        processor_s += plan.processor_s();
+        memory_mb = std::max(memory_mb, plan.memory_mb());
+        if (!plan.error.empty() && !dry)
             std::fprintf(stderr, "sonocase plan: warning: case %s is left out: %s\n",
                          plan.name.c_str(), plan.error.c_str());
     }
-    std::printf("%zu cases: %zu done, %zu to build, %zu left out\n", plans->size(),
+    std::printf("%zu cases: %zu done, %zu to build, %zu left out", plans->size(),
                 plans->size() - waiting - bad, waiting, bad);
+    if (waiting > 0)
+        std::printf("; about %.0f s of processors, %d MB in the largest job", processor_s,
+                    memory_mb);
+    std::printf("\n");
     return kDone;
 }
 

@@ -2,12 +2,12 @@
 
 #include <pybind11/stl.h>
 
+#include "array_values.h"
 #include "bindings.h"
 #include "formats/files/load_save.h"
 #include "formats/recording/session.h"
 #include "formats/scoring/session_score.h"
 #include "frame_renderer.h"
-#include "numpy_values.h"
 
 namespace sonocase::python {
 namespace {
@@ -19,17 +19,16 @@ const CaseBundle& bundle_of(const OpenedCase& opened) {
     return *opened.bundle;
 }
 
-py::array_t<std::uint8_t> label_volume(const OpenedCase& opened) {
+py::object label_volume(const OpenedCase& opened) {
     const CaseBundle& bundle = bundle_of(opened);
     const Int3 size = bundle.grid.size;
-    py::array_t<std::uint8_t> volume({size.z, size.y, size.x});
-    const std::span<std::uint8_t> out(volume.mutable_data(), bundle.grid.voxel_count());
+    const auto volume = new_array<std::uint8_t>({size.z, size.y, size.x});
     {
         const py::gil_scoped_release free_to_run;
         const std::vector<std::uint8_t> dense = dense_from_bricks(bundle.label_bricks);
-        std::copy(dense.begin(), dense.end(), out.begin());
+        std::copy(dense.begin(), dense.end(), volume.data);
     }
-    return volume;
+    return volume.object;
 }
 
 // Where the skin is on the line through `near` along `direction`.
@@ -52,30 +51,29 @@ py::object skin_normal(const OpenedCase& opened, py::handle point, double radius
 }
 
 std::vector<int> labels_at(const OpenedCase& opened, py::handle points) {
-    const CaseBundle& bundle = bundle_of(opened);
-    const py::array a = numbers_from(points, "points");
-    if (a.ndim() != 2 || a.shape(1) != 3)
+    (void)bundle_of(opened);
+    const Numbers a = numbers_from(points, "points");
+    if (a.shape.size() != 2 || a.shape[1] != 3)
         throw py::value_error("points: give an array of shape (n, 3), mm, frame `mannequin`");
-    const py::array_t<double, py::array::c_style | py::array::forcecast> d(a);
     const CaseAnatomy anatomy(opened.bundle);
     std::vector<int> labels;
-    for (py::ssize_t n = 0; n < d.shape(0); ++n)
-        labels.push_back(anatomy.label({d.at(n, 0), d.at(n, 1), d.at(n, 2)}));
-    (void)bundle;
+    for (const double* p = a.values.data(); p != a.values.data() + a.values.size(); p += 3)
+        labels.push_back(anatomy.label({p[0], p[1], p[2]}));
     return labels;
 }
 
 std::string score_text(const OpenedCase& opened,
                        const std::string& session_path,
-                       const std::optional<Exercise>& given) {
+                       const CaseExercise* given) {
     const CaseBundle& bundle = bundle_of(opened);
     const py::gil_scoped_release free_to_run;
     const Sequence sequence = value_of(load_recording_file(session_path));
     const Session session =
         value_of(session_from_sequence(sequence, guess_names(sequence), session_path));
     (void)value_of(check_session(session, session_path));
+    const Exercise* chosen = given;  // null: that of the recording
     const Exercise exercise =
-        given ? *given : value_of(exercise_named(opened, session.header.exercise));
+        chosen != nullptr ? *chosen : value_of(exercise_named(opened, session.header.exercise));
     const CaseAnatomy anatomy(opened.bundle, breathing_shown(exercise, session.header));
     return score_json(score_session(session, exercise, &anatomy, bundle.labels), exercise);
 }
@@ -85,27 +83,24 @@ py::dict read_session(const std::string& path) {
     const Sequence sequence = value_of(load_recording_file(path));
     const Session session = value_of(session_from_sequence(sequence, guess_names(sequence), path));
     const auto count = static_cast<py::ssize_t>(session.samples.size());
-    py::array_t<double> time_s(count), probe({count, py::ssize_t{4}, py::ssize_t{4}}),
-        needle({count, py::ssize_t{4}, py::ssize_t{4}});
-    py::array_t<bool> probe_ok(count), needle_ok(count);
-    py::array_t<std::int64_t> frame(count);
-    const auto put = [](py::array_t<double>& to, py::ssize_t n, const Rigid& pose) {
-        const py::array_t<double> from = array_of(pose);
-        std::copy_n(from.data(), 16, to.mutable_data(n));
-    };
+    const auto time_s = new_array<double>({count});
+    const auto probe = new_array<double>({count, 4, 4}), needle = new_array<double>({count, 4, 4});
+    const auto probe_ok = new_array<bool>({count}), needle_ok = new_array<bool>({count});
+    const auto frame = new_array<std::int64_t>({count});
     for (py::ssize_t n = 0; n < count; ++n) {
         const SessionSample& sample = session.samples[n];
-        time_s.mutable_at(n) = sample.time_s;
-        frame.mutable_at(n) = sample.frame;
-        probe_ok.mutable_at(n) = sample.probe_ok;
-        needle_ok.mutable_at(n) = sample.needle_ok;
-        put(probe, n, sample.mannequin_from_probe);
-        put(needle, n, sample.mannequin_from_drawn);
+        time_s.data[n] = sample.time_s;
+        frame.data[n] = sample.frame;
+        probe_ok.data[n] = sample.probe_ok;
+        needle_ok.data[n] = sample.needle_ok;
+        copy_rows(sample.mannequin_from_probe, probe.data + 16 * n);
+        copy_rows(sample.mannequin_from_drawn, needle.data + 16 * n);
     }
     return py::dict("exercise"_a = session.header.exercise, "case"_a = session.header.case_name,
-                    "render"_a = session.header.render, "time_s"_a = time_s, "frame"_a = frame,
-                    "probe_ok"_a = probe_ok, "mannequin_from_probe"_a = probe,
-                    "needle_ok"_a = needle_ok, "mannequin_from_drawn_needle"_a = needle);
+                    "render"_a = session.header.render, "time_s"_a = time_s.object,
+                    "frame"_a = frame.object, "probe_ok"_a = probe_ok.object,
+                    "mannequin_from_probe"_a = probe.object, "needle_ok"_a = needle_ok.object,
+                    "mannequin_from_drawn_needle"_a = needle.object);
 }
 
 void bind_label(py::module_& module) {
@@ -147,11 +142,17 @@ void bind_case(py::module_& module) {
         .def_property_readonly(
             "labels", [](const OpenedCase& c) { return bundle_of(c).labels; },
             "List of Label; an index in truth arrays is an index into it, 0 is outside the body.")
-        .def_property_readonly("exercises", [](const OpenedCase& c) { return c.exercises; })
+        .def_property_readonly("exercises",
+                               [](const OpenedCase& c) {
+                                   std::vector<CaseExercise> exercises;
+                                   for (const Exercise& e : c.exercises)
+                                       exercises.push_back({e, c.path});
+                                   return exercises;
+                               })
         .def(
             "exercise",
             [](const OpenedCase& c, const std::string& name) {
-                return value_of(exercise_named(c, name));
+                return CaseExercise{value_of(exercise_named(c, name)), c.path};
             },
             "name"_a = "", "By name; the first by default.")
         .def_property_readonly(
@@ -171,11 +172,17 @@ void bind_case(py::module_& module) {
         .def("labels_at", labels_at, "points"_a,
              "Label indices at points (n, 3), mm, frame `mannequin`, at rest, with the surfaces "
              "inside voxels as pictures show them.")
-        .def("skin_point", skin_point, "near"_a, "direction"_a, "reach_mm"_a = 60.0,
+        .def("skin_point", skin_point, "near"_a, "direction"_a, "reach_mm"_a = kSkinReachMm,
              "Skin point (3,) on the line through `near` along `direction`, or None.")
-        .def("skin_normal", skin_normal, "point"_a, "radius_mm"_a = 12.0,
+        .def("skin_normal", skin_normal, "point"_a, "radius_mm"_a = kSkinRadiusMm,
              "Outward unit normal (3,) of the skin, averaged over a ball, or None.")
         .def("_score", score_text, "session"_a, "exercise"_a = py::none())
+        .def(py::pickle(
+            [](const OpenedCase& c) {
+                check(usable(c));
+                return py::make_tuple(absolute_path(c.path));
+            },
+            [](const py::tuple& t) { return value_of(open_case(py::cast<std::string>(t[0]))); }))
         .def("__repr__", [](const OpenedCase& c) {
             return "<sonocase.Case " + c.path + (c.closed ? ", closed>" : ">");
         });

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 
+#include <cassert>
+#include <cstdio>
+
 #include <pybind11/stl.h>
 
+#include "array_values.h"
 #include "bindings.h"
 #include "formats/exercise/exercise.h"
-#include "numpy_values.h"
+#include "frame_renderer.h"
 
 namespace sonocase::python {
 namespace {
@@ -17,50 +21,160 @@ ProbeShape shape_named(const std::string& name) {
     throw py::value_error("probe: no shape " + name + "; give linear, curvilinear or phased");
 }
 
+const ProbeNumber& number_of(double Probe::*value) {
+    for (const ProbeNumber& number : probe_numbers())
+        if (number.value == value) return number;
+    assert(false && "a probe's number that probe_numbers() lacks");
+    return probe_numbers().front();
+}
+
+double checked(double Probe::*value, double given) {
+    const ProbeNumber& number = number_of(value);
+    return in_range(given, number.name, number.min, number.max);
+}
+
+// As pickle needs them.
+py::tuple state_of(const Probe& p) {
+    return py::make_tuple(probe_shape_name(p.shape), p.radius_mm, p.field_of_view_rad, p.width_mm,
+                          p.depth_mm, p.frequency_mhz, p.focus_mm, p.elevation_mm);
+}
+py::tuple state_of(const NeedleModel& n) {
+    return py::make_tuple(n.make->name, n.gauge, n.diameter_mm, n.length_mm, n.slab_mm,
+                          n.tip_visibility, n.shaft_visibility, n.bend_max_weight,
+                          n.bend_alpha_per_m, n.bend_delta_m);
+}
+
+Probe make_probe(const std::string& shape,
+                 double radius_mm,
+                 double field_of_view_rad,
+                 double width_mm,
+                 double depth_mm,
+                 double frequency_mhz,
+                 double focus_mm,
+                 double elevation_mm) {
+    return {shape_named(shape),
+            checked(&Probe::radius_mm, radius_mm),
+            checked(&Probe::field_of_view_rad, field_of_view_rad),
+            checked(&Probe::width_mm, width_mm),
+            checked(&Probe::depth_mm, depth_mm),
+            checked(&Probe::frequency_mhz, frequency_mhz),
+            checked(&Probe::focus_mm, focus_mm),
+            checked(&Probe::elevation_mm, elevation_mm)};
+}
+
+Probe probe_of_state(const py::tuple& t) {
+    const auto at = [&](int i) { return py::cast<double>(t[i]); };
+    return make_probe(py::cast<std::string>(t[0]), at(1), at(2), at(3), at(4), at(5), at(6), at(7));
+}
+
 void bind_probe(py::module_& module) {
     const Probe standard;
-    py::class_<Probe>(module, "Probe", "A probe: the area that it scans, and its beam.")
-        .def(py::init([](const std::string& shape, double radius_mm, double field_of_view_rad,
-                         double width_mm, double depth_mm, double frequency_mhz, double focus_mm,
-                         double elevation_mm) {
-                 return Probe{shape_named(shape), radius_mm,     field_of_view_rad, width_mm,
-                              depth_mm,           frequency_mhz, focus_mm,          elevation_mm};
-             }),
-             py::kw_only(), py::arg("shape") = "curvilinear",
-             py::arg("radius_mm") = standard.radius_mm,
-             py::arg("field_of_view_rad") = standard.field_of_view_rad,
-             py::arg("width_mm") = standard.width_mm, py::arg("depth_mm") = standard.depth_mm,
-             py::arg("frequency_mhz") = standard.frequency_mhz,
-             py::arg("focus_mm") = standard.focus_mm,
-             py::arg("elevation_mm") = standard.elevation_mm)
+    py::class_<Probe> probe(module, "Probe", "A probe: the area that it scans, and its beam.");
+    probe.def(py::init(&make_probe), py::kw_only(), "shape"_a = "curvilinear",
+              "radius_mm"_a = standard.radius_mm,
+              "field_of_view_rad"_a = standard.field_of_view_rad, "width_mm"_a = standard.width_mm,
+              "depth_mm"_a = standard.depth_mm, "frequency_mhz"_a = standard.frequency_mhz,
+              "focus_mm"_a = standard.focus_mm, "elevation_mm"_a = standard.elevation_mm);
+    probe.def_property(
+        "shape", [](const Probe& p) { return probe_shape_name(p.shape); },
+        [](Probe& p, const std::string& name) { p.shape = shape_named(name); },
+        "'linear', 'curvilinear' or 'phased'.");
+    const auto number = [&](double Probe::*value, const char* about) {
+        probe.def_property(
+            number_of(value).name, [value](const Probe& p) { return p.*value; },
+            [value](Probe& p, double given) { p.*value = checked(value, given); }, about);
+    };
+    number(&Probe::radius_mm, "Of the face, curvilinear.");
+    number(&Probe::field_of_view_rad, "Full opening angle, curvilinear and phased.");
+    number(&Probe::width_mm, "Of the face, linear.");
+    number(&Probe::depth_mm, "Of the picture, along the beam.");
+    number(&Probe::frequency_mhz, "Of the pulse's middle.");
+    number(&Probe::focus_mm, "Depth of the focus.");
+    number(&Probe::elevation_mm, "Full thickness of the beam at the focus.");
+    probe.def(py::pickle([](const Probe& p) { return state_of(p); }, &probe_of_state));
+    probe.def("__repr__", [](const Probe& p) {
+        return "<sonocase.Probe " + std::string(probe_shape_name(p.shape)) + ", " +
+               std::to_string(static_cast<int>(p.depth_mm)) + " mm deep>";
+    });
+    py::dict limits;
+    for (const ProbeNumber& n : probe_numbers()) limits[n.name] = py::make_tuple(n.min, n.max);
+    module.attr("_PROBE_LIMITS") = limits;
+    module.attr("_GAUGE_LIMITS") = py::make_tuple(kMinGauge, kMaxGauge);
+    module.attr("_NEEDLE_MAKES") = needle_make_names();
+}
+
+const NeedleMake* make_named(const std::string& name) {
+    if (const NeedleMake* make = find_needle_make(name)) return make;
+    std::string names;
+    for (const NeedleMake& make : needle_makes())
+        names += (names.empty() ? "" : ", ") + std::string(make.name);
+    throw py::value_error("needle: no make " + name + "; give one of " + names);
+}
+
+// A gauge of somebody's choice is the diameter from then on.
+void set_gauge(NeedleModel& needle, double gauge) {
+    needle.gauge = in_range(gauge, "gauge", kMinGauge, kMaxGauge);
+    needle.diameter_mm = 0;
+}
+
+void set_diameter(NeedleModel& needle, double diameter_mm) {
+    needle.diameter_mm = in_range(diameter_mm, "diameter_mm", 0, kMaxNeedleDiameterMm);
+}
+
+void set_length(NeedleModel& needle, double length_mm) {
+    needle.length_mm = in_range(length_mm, "length_mm", 1, kMaxNeedleLengthMm);
+}
+
+NeedleModel make_needle(const std::string& make,
+                        double gauge,
+                        double diameter_mm,
+                        double length_mm) {
+    NeedleModel needle;
+    needle.make = make_named(make);
+    set_gauge(needle, gauge);
+    set_diameter(needle, diameter_mm);
+    set_length(needle, length_mm);
+    return needle;
+}
+
+NeedleModel needle_of_state(const py::tuple& t) {
+    const auto at = [&](int i) { return py::cast<double>(t[i]); };
+    NeedleModel needle = make_needle(py::cast<std::string>(t[0]), at(1), at(2), at(3));
+    needle.slab_mm = at(4);
+    needle.tip_visibility = at(5);
+    needle.shaft_visibility = at(6);
+    needle.bend_max_weight = at(7);
+    needle.bend_alpha_per_m = at(8);
+    needle.bend_delta_m = at(9);
+    return needle;
+}
+
+void bind_needle(py::module_& module) {
+    const NeedleModel standard;
+    py::class_<NeedleModel>(module, "Needle", "A needle: how it shows, and how thick it is.")
+        .def(py::init(&make_needle), py::kw_only(), "make"_a = standard.make->name,
+             "gauge"_a = standard.gauge, "diameter_mm"_a = 0.0, "length_mm"_a = standard.length_mm,
+             "diameter_mm: instead of the gauge's where it is above 0.")
         .def_property(
-            "shape", [](const Probe& p) { return probe_shape_name(p.shape); },
-            [](Probe& p, const std::string& name) { p.shape = shape_named(name); },
-            "'linear', 'curvilinear' or 'phased'.")
-        .def_readwrite("radius_mm", &Probe::radius_mm, "Of the face, curvilinear.")
-        .def_readwrite("field_of_view_rad", &Probe::field_of_view_rad,
-                       "Full opening angle, curvilinear and phased.")
-        .def_readwrite("width_mm", &Probe::width_mm, "Of the face, linear.")
-        .def_readwrite("depth_mm", &Probe::depth_mm, "Of the picture, along the beam.")
-        .def_readwrite("frequency_mhz", &Probe::frequency_mhz)
-        .def_readwrite("focus_mm", &Probe::focus_mm)
-        .def_readwrite("elevation_mm", &Probe::elevation_mm,
-                       "Full thickness of the beam at the focus.")
-        .def("__repr__", [](const Probe& p) {
-            return "<sonocase.Probe " + std::string(probe_shape_name(p.shape)) + ", " +
-                   std::to_string(static_cast<int>(p.depth_mm)) + " mm deep>";
+            "make", [](const NeedleModel& n) { return n.make->name; },
+            [](NeedleModel& n, const std::string& name) { n.make = make_named(name); },
+            "How it shows (docs/format.md).")
+        .def_property(
+            "gauge", [](const NeedleModel& n) { return n.gauge; }, set_gauge,
+            "6 to 34; setting it sets the diameter.")
+        .def_property("diameter_mm", needle_diameter_mm, set_diameter, "0: the gauge's.")
+        .def_property(
+            "length_mm", [](const NeedleModel& n) { return n.length_mm; }, set_length,
+            "From hub to tip.")
+        .def(py::pickle([](const NeedleModel& n) { return state_of(n); }, &needle_of_state))
+        .def("__repr__", [](const NeedleModel& n) {
+            char gauge[32];
+            std::snprintf(gauge, sizeof gauge, "%g", n.gauge);
+            return "<sonocase.Needle " + std::string(n.make->name) + ", gauge " + gauge + ">";
         });
 }
 
-// A pose whose beam and lateral axis are given, as scripted sweeps have it.
-Rigid pose_along(Point3 face, Vector3 beam, Vector3 lateral) {
-    const Vector3 z = normalized(beam);
-    Vector3 x = lateral - dot(lateral, z) * z;
-    x = norm(x) > 1e-6 ? normalized(x) : any_perpendicular(z);
-    return {Matrix3::from_columns(x, cross(z, x), z), face - Point3{}};
-}
-
-void bind_targets(py::module_& module) {
+void bind_target(py::module_& module) {
     py::class_<Target>(module, "Target", "What an exercise asks the needle to reach.")
         .def_readonly("name", &Target::name)
         .def_property_readonly(
@@ -71,22 +185,31 @@ void bind_targets(py::module_& module) {
                       "A tip as near as this to the centre is a hit.")
         .def_readonly("inside", &Target::inside, "Label that it lies in; '': any.")
         .def("__repr__", [](const Target& t) { return "<sonocase.Target " + t.name + ">"; });
-    py::class_<NeedleModel>(module, "Needle", "A needle as an exercise describes it.")
-        .def_property_readonly(
-            "make", [](const NeedleModel& n) { return n.make->name; },
-            "How it shows (docs/format.md).")
-        .def_readonly("gauge", &NeedleModel::gauge)
-        .def_property_readonly("diameter_mm",
-                               [](const NeedleModel& n) { return needle_diameter_mm(n); })
-        .def_readonly("length_mm", &NeedleModel::length_mm);
+}
+
+py::tuple exercise_state(const CaseExercise& e) {
+    return py::make_tuple(absolute_path(e.case_path), e.name, state_of(e.probe),
+                          state_of(e.needle));
+}
+
+CaseExercise exercise_of_state(const py::tuple& t) {
+    const auto path = py::cast<std::string>(t[0]);
+    const auto opened = value_of(open_case(path));
+    CaseExercise exercise{value_of(exercise_named(*opened, py::cast<std::string>(t[1]))), path};
+    exercise.probe = probe_of_state(t[2]);
+    exercise.needle = needle_of_state(t[3]);
+    return exercise;
 }
 
 }  // namespace
 
 void bind_exercise(py::module_& module) {
     bind_probe(module);
-    bind_targets(module);
-    py::class_<Exercise>(module, "Exercise", "Probe, needle, targets and motion of one exercise.")
+    bind_needle(module);
+    bind_target(module);
+    py::class_<CaseExercise>(module, "Exercise",
+                             "Probe, needle, targets and motion of one exercise. Probe and needle "
+                             "may be changed before a Renderer is made.")
         .def_readonly("name", &Exercise::name)
         .def_readonly("title", &Exercise::title)
         .def_readonly("description", &Exercise::description)
@@ -94,27 +217,31 @@ void bind_exercise(py::module_& module) {
         .def_readonly("difficulty", &Exercise::difficulty)
         .def_readonly("model", &Exercise::model)
         .def_readonly("effects", &Exercise::effects)
-        .def_readonly("probe", &Exercise::probe)
-        .def_readonly("needle", &Exercise::needle)
+        .def_property(
+            "probe", [](CaseExercise& e) -> Probe& { return e.probe; },
+            [](CaseExercise& e, const Probe& p) { e.probe = p; })
+        .def_property(
+            "needle", [](CaseExercise& e) -> NeedleModel& { return e.needle; },
+            [](CaseExercise& e, const NeedleModel& n) { e.needle = n; })
         .def_readonly("targets", &Exercise::targets)
         .def_readonly("no_go", &Exercise::no_go, "Labels that the needle must not touch.")
         .def_property_readonly(
             "start_pose",
-            [](const Exercise& e) {
+            [](const CaseExercise& e) {
                 return array_of(pose_along(e.start_probe, e.start_beam, {1, 0, 0}));
             },
             "mannequin_from_probe where the exercise begins, before the probe is set down on the "
             "skin; shape (4, 4), mm.")
         .def_property_readonly(
             "breathing",
-            [](const Exercise& e) {
+            [](const CaseExercise& e) {
                 return py::dict("amplitude_mm"_a = e.breathing.amplitude_mm,
                                 "period_s"_a = e.breathing.period_s);
             },
             "{'amplitude_mm', 'period_s'}; amplitude 0: none.")
         .def(
             "sweep_poses",
-            [](const Exercise& e, const std::string& name) {
+            [](const CaseExercise& e, const std::string& name) {
                 for (const Sweep& sweep : e.sweeps) {
                     if (sweep.name != name) continue;
                     py::list poses;
@@ -126,12 +253,14 @@ void bind_exercise(py::module_& module) {
             },
             "name"_a, "The key poses of a scripted sweep, each (4, 4), mm.")
         .def_property_readonly("sweeps",
-                               [](const Exercise& e) {
+                               [](const CaseExercise& e) {
                                    py::list names;
                                    for (const Sweep& sweep : e.sweeps) names.append(sweep.name);
                                    return names;
                                })
-        .def("__repr__", [](const Exercise& e) { return "<sonocase.Exercise " + e.name + ">"; });
+        .def(py::pickle(&exercise_state, &exercise_of_state))
+        .def("__repr__",
+             [](const CaseExercise& e) { return "<sonocase.Exercise " + e.name + ">"; });
 }
 
 }  // namespace sonocase::python

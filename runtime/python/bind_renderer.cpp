@@ -11,48 +11,41 @@
 
 #include <pybind11/stl.h>
 
+#include "array_values.h"
 #include "bind_truth.h"
 #include "bindings.h"
 #include "doppler_values.h"
 #include "formats/files/load_save.h"
 #include "frame_renderer.h"
-#include "numpy_values.h"
 
 namespace sonocase::python {
 
-using Bytes = py::array_t<std::uint8_t, py::array::c_style>;
-
-void set_scalars(double time_s, std::int64_t frame, double gain_db, runtime::FrameInput& input);
+void set_scalars(double time_s, std::int64_t frame, runtime::FrameInput& input);
+void set_console(double gain_db, double dynamic_range_db, runtime::FrameInput& input);
 void set_press(double press_mm, runtime::FrameInput& input);
 
 // One task per pose. poses: (n, 4, 4); needles, times_s: None, or one per pose.
 std::vector<FrameTask> batch_tasks(py::handle poses,
                                    py::handle needles,
                                    py::handle times_s,
-                                   std::int64_t first_frame,
-                                   double gain_db);
+                                   std::int64_t first_frame);
 // press_mm: one number, or one per frame.
 void press_batch(const py::object& press_mm, std::vector<FrameTask>& tasks);
 // None, or a pair or None per frame.
 void dent_batch(py::handle dents, std::vector<FrameTask>& tasks);
 
-// out itself, if it is a writeable array of bytes of this shape.
-py::object checked_out(const py::object& out, const std::vector<py::ssize_t>& shape);
-
-namespace {
-
-using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
-
-}  // namespace
-
-void set_scalars(double time_s, std::int64_t frame, double gain_db, runtime::FrameInput& input) {
-    if (!std::isfinite(time_s)) throw py::value_error("time_s: not finite");
+void set_console(double gain_db, double dynamic_range_db, runtime::FrameInput& input) {
     if (!std::isfinite(gain_db)) throw py::value_error("gain_db: not finite");
+    input.settings.gain_db = gain_db;
+    input.settings.dynamic_range_db = in_range(dynamic_range_db, "dynamic_range_db", 20, 120);
+}
+
+void set_scalars(double time_s, std::int64_t frame, runtime::FrameInput& input) {
+    if (!std::isfinite(time_s)) throw py::value_error("time_s: not finite");
     if (frame < 0 || frame > std::numeric_limits<std::uint32_t>::max())
         throw py::value_error("frame: give 0 to 2^32 - 1");
     input.time_s = time_s;
     input.frame = static_cast<std::uint32_t>(frame);
-    input.settings.gain_db = gain_db;
 }
 
 void set_press(double press_mm, runtime::FrameInput& input) {
@@ -61,12 +54,12 @@ void set_press(double press_mm, runtime::FrameInput& input) {
 }
 
 void press_batch(const py::object& press_mm, std::vector<FrameTask>& tasks) {
-    const Doubles values(numbers_from(press_mm, "press_mm"));
-    const bool one = values.ndim() == 0;
-    if (!one && !(values.ndim() == 1 && values.shape(0) == static_cast<py::ssize_t>(tasks.size())))
+    const Numbers given = numbers_from(press_mm, "press_mm");
+    const bool one = given.shape.empty();
+    if (!one && given.shape != Shape{static_cast<py::ssize_t>(tasks.size())})
         throw py::value_error("press_mm: give one number, or one per pose");
     for (std::size_t n = 0; n < tasks.size(); ++n)
-        set_press(values.data()[one ? 0 : n], tasks[n].input);
+        set_press(given.values[one ? 0 : n], tasks[n].input);
 }
 
 void dent_batch(py::handle dents, std::vector<FrameTask>& tasks) {
@@ -80,51 +73,33 @@ void dent_batch(py::handle dents, std::vector<FrameTask>& tasks) {
     }
 }
 
-py::object checked_out(const py::object& out, const std::vector<py::ssize_t>& shape) {
-    if (!py::isinstance<Bytes>(out))
-        throw py::type_error("out: give a C-contiguous array of dtype uint8");
-    const Bytes a = py::reinterpret_borrow<Bytes>(out);
-    bool fits = a.ndim() == static_cast<py::ssize_t>(shape.size());
-    std::string wanted;
-    for (std::size_t i = 0; i < shape.size(); ++i) {
-        fits = fits && a.shape(static_cast<py::ssize_t>(i)) == shape[i];
-        wanted += (i > 0 ? ", " : "") + std::to_string(shape[i]);
-    }
-    if (!fits) throw py::value_error("out: give an array of shape (" + wanted + ")");
-    if (!a.writeable()) throw py::value_error("out: the array is read-only");
-    return out;
-}
-
 std::vector<FrameTask> batch_tasks(py::handle poses,
                                    py::handle needles,
                                    py::handle times_s,
-                                   std::int64_t first_frame,
-                                   double gain_db) {
-    const py::array a = numbers_from(poses, "poses");
-    if (a.ndim() != 3 || a.shape(1) != 4 || a.shape(2) != 4)
+                                   std::int64_t first_frame) {
+    const Numbers rows = numbers_from(poses, "poses");
+    if (rows.shape.size() != 3 || rows.shape[1] != 4 || rows.shape[2] != 4)
         throw py::value_error("poses: give an array of shape (n, 4, 4), rigid motions in mm");
-    const Doubles rows(a);
-    std::vector<FrameTask> tasks(rows.shape(0));
-    std::optional<Doubles> times;
+    std::vector<FrameTask> tasks(rows.shape[0]);
+    std::optional<Numbers> times;
     if (!times_s.is_none()) {
-        times = Doubles(numbers_from(times_s, "times_s"));
-        if (times->ndim() != 1 || times->shape(0) != rows.shape(0))
+        times = numbers_from(times_s, "times_s");
+        if (times->shape != Shape{rows.shape[0]})
             throw py::value_error("times_s: give one number per pose");
     }
     py::sequence needle_of;
     if (!needles.is_none()) {
         needle_of = py::reinterpret_borrow<py::sequence>(needles);
-        if (!PySequence_Check(needles.ptr()) ||
-            py::len(needle_of) != static_cast<std::size_t>(rows.shape(0)))
+        if (!PySequence_Check(needles.ptr()) || py::len(needle_of) != tasks.size())
             throw py::value_error("needles: give one per pose; None for no needle");
     }
     for (std::size_t n = 0; n < tasks.size(); ++n) {
         runtime::FrameInput& input = tasks[n].input;
         input.mannequin_from_probe =
-            rigid_from(rows.data(static_cast<py::ssize_t>(n)), "poses[" + std::to_string(n) + "]");
+            rigid_from(rows.values.data() + 16 * n, "poses[" + std::to_string(n) + "]");
         if (!needles.is_none()) set_needle(py::object(needle_of[n]), input);
-        set_scalars(times ? times->at(static_cast<py::ssize_t>(n)) : 0,
-                    first_frame + static_cast<std::int64_t>(n), gain_db, input);
+        set_scalars(times ? times->values[n] : 0, first_frame + static_cast<std::int64_t>(n),
+                    input);
     }
     return tasks;
 }
@@ -148,21 +123,65 @@ class Turn {
     std::atomic<bool>& busy_;
 };
 
+// Where pictures go: the caller's array, or a new one.
+struct Pixels {
+    Pixels(const py::object& out, const Shape& shape) {
+        if (out.is_none()) {
+            const auto made = new_array<std::uint8_t>(shape);
+            object = made.object;
+            data = made.data;
+        } else {
+            view = writeable_bytes(out, shape);
+            object = out;
+            data = static_cast<std::uint8_t*>(view->data());
+        }
+    }
+    std::optional<ArrayView> view;  // holds the caller's memory in place
+    py::object object;
+    std::uint8_t* data;
+};
+
+// How a renderer was asked for, and how it is made again from a pickle.
+struct Request {
+    CaseExercise exercise;
+    std::string model, machine;  // "": the exercise's; the probe's
+    std::vector<std::string> effects;
+    int width_px = 512, height_px = 512;
+    std::uint32_t seed = 1;
+    std::string kind = "fast";
+    int scanlines = 0, samples = 0, looks = 0;  // 0: the model's or the machine's
+};
+
 class PyRenderer {
   public:
-    explicit PyRenderer(std::unique_ptr<FrameRenderer> renderer) : renderer_(std::move(renderer)) {}
+    PyRenderer(std::unique_ptr<FrameRenderer> renderer, Request request)
+        : renderer_(std::move(renderer)), request_(std::move(request)) {}
 
-    const FrameRenderer& inner() const { return *renderer_; }
-    py::ssize_t width() const { return renderer_->options().width_px; }
-    py::ssize_t height() const { return renderer_->options().height_px; }
+    py::ssize_t width() const { return request_.width_px; }
+    py::ssize_t height() const { return request_.height_px; }
+    const Request& request() const { return request_; }
     bool contact() const { return contact_; }
     py::dict press() const { return press_of(press_); }
+
+    // Raises once the renderer or its case is closed.
+    FrameRenderer& inner() const {
+        if (renderer_ == nullptr)
+            throw OutsideError(Error{"the renderer is closed", "", "make another one"});
+        check(usable(renderer_->opened()));
+        return *renderer_;
+    }
+    bool closed() const { return renderer_ == nullptr; }
+    void close() {
+        const Turn turn(busy_);
+        renderer_.reset();
+    }
 
     py::object render(py::handle pose,
                       py::handle needle,
                       double time_s,
                       std::int64_t frame,
                       double gain_db,
+                      double dynamic_range_db,
                       double press_mm,
                       py::handle dent,
                       const py::object& out,
@@ -171,40 +190,40 @@ class PyRenderer {
         FrameTask task;
         task.input.mannequin_from_probe = rigid_from(pose, "pose");
         set_needle(needle, task.input);
-        set_scalars(time_s, frame, gain_db, task.input);
+        set_scalars(time_s, frame, task.input);
+        set_console(gain_db, dynamic_range_db, task.input);
         set_press(press_mm, task.input);
         set_dent(dent, task.input, "dent");
         mode_ = doppler_mode(mode);
         if (mode_ != runtime::DopplerMode::off) return render_doppler(task, doppler, out);
-        py::object picture = out.is_none() ? py::object(Bytes({height(), width()}))
-                                           : checked_out(out, {height(), width()});
-        task.pixels = {static_cast<Bytes&>(picture).mutable_data(),
-                       static_cast<std::size_t>(width() * height())};
+        const Pixels picture(out, {height(), width()});
+        task.pixels = {picture.data, static_cast<std::size_t>(width() * height())};
         const Turn turn(busy_);
-        check(usable(renderer_->opened()));
+        FrameRenderer& renderer = inner();
+        refuse_metres(task.input.mannequin_from_probe, "pose");
         {
             const py::gil_scoped_release free_to_run;
-            renderer_->render(task);
+            renderer.render(task);
         }
-        check(usable(renderer_->opened()));
+        check(usable(renderer.opened()));
         contact_ = task.status != runtime::FrameStatus::no_contact;
         press_ = task.press;
         last_ = task.input;
-        return picture;
+        return picture.object;
     }
 
     // Box, gate and cursor on the widest vessel of a plane.
     py::dict aimed(py::handle pose) {
         const Turn turn(busy_);
-        check(usable(renderer_->opened()));
-        check(renderer_->prepare_doppler());
-        return aim_of(renderer_->aimed(rigid_from(pose, "pose"), {}, true));
+        FrameRenderer& renderer = inner();
+        check(renderer.prepare_doppler());
+        return aim_of(renderer.aimed(rigid_from(pose, "pose"), {}, true));
     }
 
     py::dict doppler() const {
         if (mode_ == runtime::DopplerMode::off)
             throw std::runtime_error("renderer: the last frame was of no Doppler mode");
-        return measures_of(renderer_->doppler(), mode_, renderer_->opened().bundle->labels);
+        return measures_of(inner().doppler(), mode_, inner().opened().bundle->labels);
     }
 
     // The last frame's: (planes, facts).
@@ -214,15 +233,15 @@ class PyRenderer {
         const TruthArrays arrays = TruthArrays::make(names, -1, height(), width());
         task.planes = arrays.planes(0, width() * height());
         const Turn turn(busy_);
-        check(usable(renderer_->opened()));
-        check(renderer_->prepare_truth());
+        FrameRenderer& renderer = inner();
+        check(renderer.prepare_truth());
         {
             const py::gil_scoped_release free_to_run;
-            renderer_->describe(task);
+            renderer.describe(task);
         }
-        check(usable(renderer_->opened()));
-        return py::make_tuple(arrays, facts_of(task.truth, renderer_->opened().bundle->labels,
-                                               renderer_->exercise()));
+        check(usable(renderer.opened()));
+        return py::make_tuple(
+            arrays, facts_of(task.truth, renderer.opened().bundle->labels, renderer.exercise()));
     }
 
     py::object render_batch(py::handle poses,
@@ -230,47 +249,51 @@ class PyRenderer {
                             py::handle times_s,
                             std::int64_t first_frame,
                             double gain_db,
+                            double dynamic_range_db,
                             const py::object& press_mm,
                             py::handle dents,
                             const py::object& out,
                             int threads,
                             const std::optional<std::vector<std::string>>& truth) {
         if (threads < 1 || threads > 256) throw py::value_error("threads: give 1 to 256");
-        std::vector<FrameTask> tasks = batch_tasks(poses, needles, times_s, first_frame, gain_db);
+        std::vector<FrameTask> tasks = batch_tasks(poses, needles, times_s, first_frame);
+        for (FrameTask& task : tasks) {
+            set_console(gain_db, dynamic_range_db, task.input);
+        }
         press_batch(press_mm, tasks);
         dent_batch(dents, tasks);
         const auto count = static_cast<py::ssize_t>(tasks.size());
-        py::object pictures = out.is_none() ? py::object(Bytes({count, height(), width()}))
-                                            : checked_out(out, {count, height(), width()});
-        std::uint8_t* to = static_cast<Bytes&>(pictures).mutable_data();
+        const Pixels pictures(out, {count, height(), width()});
         const std::size_t area = width() * height();
         TruthArrays arrays;
         if (truth) arrays = TruthArrays::make(*truth, count, height(), width());
         for (std::size_t n = 0; n < tasks.size(); ++n) {
-            tasks[n].pixels = {to + n * area, area};
+            tasks[n].pixels = {pictures.data + n * area, area};
             tasks[n].wants_truth = truth.has_value();
             tasks[n].planes = arrays.planes(n, area);
         }
         const Turn turn(busy_);
-        check(usable(renderer_->opened()));
+        FrameRenderer& renderer = inner();
+        for (std::size_t n = 0; n < tasks.size(); ++n)
+            refuse_metres(tasks[n].input.mannequin_from_probe, "poses[" + std::to_string(n) + "]");
         std::optional<Result<bool>> whole;
         {
             const py::gil_scoped_release free_to_run;
-            whole = renderer_->render_all(tasks, threads, [] {
+            whole = renderer.render_all(tasks, threads, [] {
                 const py::gil_scoped_acquire hold;
                 return PyErr_CheckSignals() != 0;
             });
         }
         if (!value_of(*whole)) throw py::error_already_set();  // Ctrl-C, as Python's own exception
-        check(usable(renderer_->opened()));
+        check(usable(renderer.opened()));
         if (!tasks.empty()) last_ = tasks.back().input;
         if (!tasks.empty()) press_ = tasks.back().press;
-        if (!truth) return pictures;
+        if (!truth) return pictures.object;
         py::list facts;
         for (const FrameTask& task : tasks)
             facts.append(
-                facts_of(task.truth, renderer_->opened().bundle->labels, renderer_->exercise()));
-        return py::make_tuple(pictures, arrays, facts);
+                facts_of(task.truth, renderer.opened().bundle->labels, renderer.exercise()));
+        return py::make_tuple(pictures.object, arrays, facts);
     }
 
     const runtime::FrameInput& last() const {
@@ -278,15 +301,36 @@ class PyRenderer {
         return *last_;
     }
 
+    // Of the last frame: name and why.
+    py::dict skipped_effects() const {
+        py::dict skipped;
+        for (const runtime::EffectCost& cost : inner().engine().renderer().costs())
+            if (!cost.ran) skipped[cost.name] = cost.why;
+        return skipped;
+    }
+
   private:
+    // A pose in metres puts the face within 2 mm of the frame's origin, where a face in millimetres
+    // lies only if the skin does.
+    void refuse_metres(const Rigid& pose, const std::string& name) const {
+        const double far_mm = norm(pose.translation);
+        if (!(far_mm > 0 && far_mm < 2)) return;
+        const runtime::Skin skin(*inner().opened().bundle);
+        if (norm(skin.normal(Point3{} + pose.translation, kSkinRadiusMm)) > 0) return;
+        throw py::value_error(name +
+                              ": a translation of less than 2 mm, far from the skin; give it in "
+                              "millimetres, not in metres");
+    }
+
     py::object render_doppler(FrameTask& task, const py::dict& given, const py::object& out) {
         runtime::DopplerSettings& settings = task.input.settings.doppler;
         const Turn turn(busy_);
-        check(usable(renderer_->opened()));
-        check(renderer_->prepare_doppler());
+        FrameRenderer& renderer = inner();
+        refuse_metres(task.input.mannequin_from_probe, "pose");
+        check(renderer.prepare_doppler());
         apply_doppler(given, settings);
-        const runtime::DopplerSettings aim = renderer_->aimed(
-            task.input.mannequin_from_probe, settings, !given.contains("steer_deg"));
+        const runtime::DopplerSettings aim =
+            renderer.aimed(task.input.mannequin_from_probe, settings, !given.contains("steer_deg"));
         py::dict places = aim_of(aim);
         for (const auto& key : {"box_left", "box_right", "box_top_mm", "box_bottom_mm"})
             if (gives_box(given)) places.attr("pop")(key);
@@ -297,25 +341,25 @@ class PyRenderer {
         settings.mode = mode_;
         if (last_) runtime::add_probe_motion(*last_, task.input);
         const py::ssize_t rows = runtime::doppler_rows(mode_, static_cast<int>(height()));
-        py::object picture = out.is_none() ? py::object(Bytes({rows, width(), py::ssize_t{3}}))
-                                           : checked_out(out, {rows, width(), 3});
+        const Pixels picture(out, {rows, width(), 3});
         std::vector<std::uint8_t> grey(width() * height());
         task.pixels = grey;
-        const std::span<std::uint8_t> rgb(static_cast<Bytes&>(picture).mutable_data(),
+        const std::span<std::uint8_t> rgb(picture.data,
                                           static_cast<std::size_t>(3 * width() * rows));
         {
             const py::gil_scoped_release free_to_run;
-            renderer_->render(task);
-            renderer_->show_doppler(task, rgb);
+            renderer.render(task);
+            renderer.show_doppler(task, rgb);
         }
-        check(usable(renderer_->opened()));
+        check(usable(renderer.opened()));
         contact_ = task.status != runtime::FrameStatus::no_contact;
         press_ = task.press;
         last_ = task.input;
-        return picture;
+        return picture.object;
     }
 
-    std::unique_ptr<FrameRenderer> renderer_;
+    std::unique_ptr<FrameRenderer> renderer_;  // null: closed
+    Request request_;
     std::atomic<bool> busy_{false};
     bool contact_ = true;
     runtime::DopplerMode mode_ = runtime::DopplerMode::off;  // of the last frame
@@ -323,69 +367,133 @@ class PyRenderer {
     std::optional<runtime::FrameInput> last_;
 };
 
+std::unique_ptr<PyRenderer> renderer_of(const std::shared_ptr<OpenedCase>& opened,
+                                        const Request& request) {
+    check(usable(*opened));
+    runtime::RenderOptions options;
+    const std::string model = request.model.empty() ? request.exercise.model : request.model;
+    if (model != "paper" && model != "physical")
+        throw py::value_error("model: no model " + model + "; give physical or paper");
+    options.model = model == "paper" ? runtime::ImageModel::paper : runtime::ImageModel::physical;
+    if (request.kind != "fast" && request.kind != "reference")
+        throw py::value_error("renderer: no renderer " + request.kind + "; give fast or reference");
+    options.kind =
+        request.kind == "fast" ? runtime::RendererKind::fast : runtime::RendererKind::reference;
+    options.width_px = request.width_px;
+    options.height_px = request.height_px;
+    options.seed = request.seed;
+    options.effects = request.effects;
+    options.scanlines = request.scanlines;
+    options.samples = request.samples;
+    options.looks = request.looks;
+    const py::gil_scoped_release free_to_run;
+    if (!request.machine.empty()) options.machine = value_of(load_machine(request.machine));
+    return std::make_unique<PyRenderer>(
+        value_of(FrameRenderer::create(opened, request.exercise, options)), request);
+}
+
 // What the arguments ask for.
 std::unique_ptr<PyRenderer> make_renderer(const std::shared_ptr<OpenedCase>& opened,
                                           const py::object& exercise,
                                           const std::optional<Probe>& probe,
+                                          const std::optional<NeedleModel>& needle,
                                           const std::string& model,
                                           const std::string& machine,
                                           const py::object& effects,
                                           std::pair<int, int> size,
                                           std::uint32_t seed,
-                                          const std::string& kind) {
+                                          const std::string& kind,
+                                          int scanlines,
+                                          int samples,
+                                          int looks) {
     check(usable(*opened));
-    Exercise chosen;
-    if (py::isinstance<Exercise>(exercise)) {
-        chosen = py::cast<Exercise>(exercise);
+    Request request;
+    if (py::isinstance<CaseExercise>(exercise)) {
+        request.exercise = py::cast<CaseExercise>(exercise);
     } else if (exercise.is_none() || py::isinstance<py::str>(exercise)) {
-        chosen = value_of(exercise_named(
-            *opened, exercise.is_none() ? std::string() : py::cast<std::string>(exercise)));
+        const auto name = exercise.is_none() ? std::string() : py::cast<std::string>(exercise);
+        request.exercise = {value_of(exercise_named(*opened, name)), opened->path};
     } else {
         throw py::type_error("exercise: give a name or an Exercise");
     }
-    if (probe) chosen.probe = *probe;
-    runtime::RenderOptions options;
-    const std::string wanted = model.empty() ? chosen.model : model;
-    if (wanted != "paper" && wanted != "physical")
-        throw py::value_error("model: no model " + wanted + "; give physical or paper");
-    options.model = wanted == "paper" ? runtime::ImageModel::paper : runtime::ImageModel::physical;
-    if (kind != "fast" && kind != "reference")
-        throw py::value_error("renderer: no renderer " + kind + "; give fast or reference");
-    options.kind = kind == "fast" ? runtime::RendererKind::fast : runtime::RendererKind::reference;
-    options.width_px = size.first;
-    options.height_px = size.second;
-    options.seed = seed;
+    if (probe) request.exercise.probe = *probe;
+    if (needle) request.exercise.needle = *needle;
+    request.model = model;
+    request.machine = machine;
     if (effects.is_none()) {
-        options.effects = chosen.effects;
+        request.effects = request.exercise.effects;
     } else if (py::isinstance<py::str>(effects)) {
-        options.effects = {py::cast<std::string>(effects)};
+        request.effects = {py::cast<std::string>(effects)};
     } else {
-        options.effects = py::cast<std::vector<std::string>>(effects);
+        request.effects = py::cast<std::vector<std::string>>(effects);
     }
-    const py::gil_scoped_release free_to_run;
-    if (!machine.empty()) options.machine = value_of(load_machine(machine));
-    return std::make_unique<PyRenderer>(value_of(FrameRenderer::create(opened, chosen, options)));
+    request.width_px = size.first;
+    request.height_px = size.second;
+    request.seed = seed;
+    request.kind = kind;
+    request.scanlines = scanlines;
+    request.samples = samples;
+    request.looks = looks;
+    return renderer_of(opened, request);
+}
+
+// As pickle keeps a renderer, for the workers of loaders: what it was asked for, no frames.
+py::tuple renderer_state(const PyRenderer& renderer) {
+    const Request& r = renderer.request();
+    const OpenedCase& opened = renderer.inner().opened();
+    const bool is_file = py::cast<bool>(py::module_::import("os.path").attr("exists")(r.machine));
+    return py::make_tuple(absolute_path(opened.path), r.exercise, r.model,
+                          is_file ? absolute_path(r.machine) : r.machine, r.effects, r.width_px,
+                          r.height_px, r.seed, r.kind, r.scanlines, r.samples, r.looks);
+}
+
+std::unique_ptr<PyRenderer> renderer_of_state(const py::tuple& t) {
+    const auto opened = value_of(open_case(py::cast<std::string>(t[0])));
+    Request r;
+    r.exercise = py::cast<CaseExercise>(t[1]);
+    r.model = py::cast<std::string>(t[2]);
+    r.machine = py::cast<std::string>(t[3]);
+    r.effects = py::cast<std::vector<std::string>>(t[4]);
+    r.width_px = py::cast<int>(t[5]);
+    r.height_px = py::cast<int>(t[6]);
+    r.seed = py::cast<std::uint32_t>(t[7]);
+    r.kind = py::cast<std::string>(t[8]);
+    r.scanlines = py::cast<int>(t[9]);
+    r.samples = py::cast<int>(t[10]);
+    r.looks = py::cast<int>(t[11]);
+    return renderer_of(opened, r);
 }
 
 }  // namespace
 
 void bind_renderer(py::module_& module) {
     py::class_<PyRenderer>(module, "Renderer", "Renders frames of a case, as sonoplay does.")
-        .def(py::init(&make_renderer), "case"_a, "exercise"_a = py::none(), "probe"_a = py::none(),
-             py::kw_only(), "model"_a = "", "machine"_a = "", "effects"_a = py::none(),
-             "size"_a = std::pair<int, int>(512, 512), "seed"_a = 1u, "renderer"_a = "fast",
-             "exercise: a name or an Exercise, the case's first by default; probe: instead of the "
-             "exercise's; model, machine, effects: as on sonoplay's command line, by default the "
-             "exercise's; size: (width, height) in pixels; seed: of the noise.")
+        .def(
+            py::init(&make_renderer), "case"_a, "exercise"_a = py::none(), "probe"_a = py::none(),
+            "needle"_a = py::none(), py::kw_only(), "model"_a = "", "machine"_a = "",
+            "effects"_a = py::none(), "size"_a = std::pair<int, int>(512, 512), "seed"_a = 1u,
+            "renderer"_a = "fast", "scanlines"_a = 0, "samples"_a = 0, "looks"_a = 0,
+            "exercise: a name or an Exercise, the case's first by default; probe, needle: instead "
+            "of the exercise's; model, machine, effects: as on sonoplay's command line, by default "
+            "the exercise's; size: (width, height) in pixels; seed: of the noise; scanlines, "
+            "samples (of each), looks (speckle fields that are averaged): 0 for the model's own.")
+        .def("close", &PyRenderer::close,
+             "Frees its memory: it raises from then on. Its case stays open.")
+        .def_property_readonly("closed", &PyRenderer::closed)
+        .def("__enter__", [](const py::object& self) { return self; })
+        .def("__exit__", [](PyRenderer& r, const py::args&) { r.close(); })
+        .def(py::pickle(&renderer_state, &renderer_of_state))
         .def("render", &PyRenderer::render, "pose"_a, "needle"_a = py::none(), "time_s"_a = 0.0,
-             py::kw_only(), "frame"_a = 0, "gain_db"_a = 0.0, "press_mm"_a = 0.0,
-             "dent"_a = py::none(), "out"_a = py::none(), "mode"_a = "b", "doppler"_a = py::dict(),
+             py::kw_only(), "frame"_a = 0, "gain_db"_a = 0.0, "dynamic_range_db"_a = 60.0,
+             "press_mm"_a = 0.0, "dent"_a = py::none(), "out"_a = py::none(), "mode"_a = "b",
+             "doppler"_a = py::dict(),
              "One frame: uint8 array (height, width). pose: mannequin_from_probe, 4 x 4, mm. "
              "needle: None, mannequin_from_needle (4 x 4; tip at the origin, z from hub to tip, x "
              "to "
              "the bevel's side), "
              "or (tip, direction). time_s: drives breathing and pulse. frame: seeds the noise; "
-             "sonoplay counts 0, 1, 2, ... press_mm: how much deeper than its pose the probe is "
+             "sonoplay counts 0, 1, 2, ... gain_db, dynamic_range_db (20 to 120, which model paper "
+             "lacks): knobs of the console. press_mm: how much deeper than its pose the probe is "
              "pressed, 0 to 40. dent: (tent_mm, drag_mm), by which the needle pushes the layer "
              "before its tip and drags tissue along its shaft; a player's needle has them from its "
              "past, and its truth says them (`dent_mm`). out: written to instead of a new array. "
@@ -401,8 +509,8 @@ void bind_renderer(py::module_& module) {
                                "spectrum and what was true there, or of a colour box's cells.")
         .def("render_batch", &PyRenderer::render_batch, "poses"_a, "needles"_a = py::none(),
              "times_s"_a = py::none(), py::kw_only(), "first_frame"_a = 0, "gain_db"_a = 0.0,
-             "press_mm"_a = 0.0, "dents"_a = py::none(), "out"_a = py::none(), "threads"_a = 1,
-             "truth"_a = py::none(),
+             "dynamic_range_db"_a = 60.0, "press_mm"_a = 0.0, "dents"_a = py::none(),
+             "out"_a = py::none(), "threads"_a = 1, "truth"_a = py::none(),
              "Many frames: uint8 array (n, height, width). poses: (n, 4, 4). needles: a sequence "
              "of what render() takes. Frame i has number first_frame + i. press_mm: one number, or "
              "one per pose; dents: None, or one dent or None per pose. The pixels do not "
@@ -420,7 +528,9 @@ void bind_renderer(py::module_& module) {
                                "(by how much bone held it back) and `vein_open`.")
         .def_property_readonly(
             "size", [](const PyRenderer& r) { return py::make_tuple(r.width(), r.height()); })
-        .def_property_readonly("exercise", [](const PyRenderer& r) { return r.inner().exercise(); })
+        .def_property_readonly("exercise", [](const PyRenderer& r) { return r.request().exercise; })
+        .def_property_readonly("skipped_effects", &PyRenderer::skipped_effects,
+                               "Effects that the last frame did without: by name, why.")
         .def_property_readonly(
             "mm_per_px",
             [](const PyRenderer& r) { return r.inner().engine().renderer().layout().mm_per_px; })

@@ -10,10 +10,9 @@ namespace sonocase::python {
 namespace {
 
 template <class T>
-std::span<T> plane_of(const py::object& array, std::size_t n, std::size_t area) {
-    if (array.is_none()) return {};
-    auto values = py::reinterpret_borrow<py::array_t<T>>(array);
-    return {values.mutable_data() + n * area, area};
+std::span<T> plane_of(const NewArray<T>& array, std::size_t n, std::size_t area) {
+    if (array.data == nullptr) return {};
+    return {array.data + n * area, area};
 }
 
 py::list organs_of(const runtime::FrameTruth& truth, const std::vector<Label>& labels) {
@@ -47,23 +46,23 @@ TruthArrays TruthArrays::make(const std::vector<std::string>& names,
                               py::ssize_t height,
                               py::ssize_t width) {
     TruthArrays arrays;
-    std::vector<py::ssize_t> shape{height, width};
+    Shape shape{height, width};
     if (count >= 0) shape.insert(shape.begin(), count);
     for (const std::string& name : names) {
         if (name == "labels") {
-            arrays.labels = py::array_t<std::uint8_t>(shape);
+            arrays.labels = new_array<std::uint8_t>(shape);
         } else if (name == "needle") {
-            arrays.needle = py::array_t<std::uint8_t>(shape);
+            arrays.needle = new_array<std::uint8_t>(shape);
         } else if (name == "shadowed") {
-            arrays.shadowed = py::array_t<std::uint8_t>(shape);
+            arrays.shadowed = new_array<std::uint8_t>(shape);
         } else if (name == "skin_depth_mm") {
-            arrays.skin_depth_mm = py::array_t<float>(shape);
+            arrays.skin_depth_mm = new_array<float>(shape);
         } else {
             throw py::value_error("truth: no plane " + name +
                                   "; give labels, needle, shadowed or skin_depth_mm");
         }
     }
-    if (!arrays.shadowed.is_none() && arrays.labels.is_none())
+    if (arrays.shadowed.data != nullptr && arrays.labels.data == nullptr)
         throw py::value_error("truth: shadowed is found from the labels; ask for both");
     return arrays;
 }
@@ -105,13 +104,18 @@ void bind_truth(py::module_& module) {
     py::class_<TruthArrays>(module, "TruthPlanes",
                             "What each pixel shows: arrays (height, width), or (n, height, width) "
                             "of a batch; None where not asked for.")
-        .def_readonly("labels", &TruthArrays::labels,
-                      "uint8, index into Case.labels; 0: outside the body or the scanned area.")
-        .def_readonly("needle", &TruthArrays::needle, "uint8; 0: none, 1: shaft, 2: tip.")
-        .def_readonly("shadowed", &TruthArrays::shadowed,
-                      "uint8; 1: the beam met bone or gas before it came here.")
-        .def_readonly("skin_depth_mm", &TruthArrays::skin_depth_mm,
-                      "float32, along the beam from the skin; NaN outside the scanned area.");
+        .def_property_readonly(
+            "labels", [](const TruthArrays& t) { return t.labels.object; },
+            "uint8, index into Case.labels; 0: outside the body or the scanned area.")
+        .def_property_readonly(
+            "needle", [](const TruthArrays& t) { return t.needle.object; },
+            "uint8; 0: none, 1: shaft, 2: tip.")
+        .def_property_readonly(
+            "shadowed", [](const TruthArrays& t) { return t.shadowed.object; },
+            "uint8; 1: the beam met bone or gas before it came here.")
+        .def_property_readonly(
+            "skin_depth_mm", [](const TruthArrays& t) { return t.skin_depth_mm.object; },
+            "float32, along the beam from the skin; NaN outside the scanned area.");
 }
 
 }  // namespace sonocase::python

@@ -5,9 +5,9 @@
 
 #include <vector>
 
+#include "array_values.h"
 #include "formats/exercise/exercise.h"
 #include "formats/volume/label_volume.h"
-#include "numpy_values.h"
 #include "runtime/imaging/truth/frame_truth.h"
 
 namespace sonocase::python {
@@ -15,8 +15,8 @@ namespace sonocase::python {
 // Arrays for the planes of `count` frames, of shape (count, height, width), or (height, width)
 // where count is 0. Named as TruthPlanes; those that are not asked for stay None.
 struct TruthArrays {
-    py::object labels = py::none(), needle = py::none(), shadowed = py::none(),
-               skin_depth_mm = py::none();
+    NewArray<std::uint8_t> labels, needle, shadowed;
+    NewArray<float> skin_depth_mm;
 
     // names: of planes; raises ValueError for another one.
     static TruthArrays make(const std::vector<std::string>& names,

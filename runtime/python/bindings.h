@@ -9,6 +9,7 @@ namespace sonocase::python {
 
 void bind_exercise(pybind11::module_& module);  // Probe, Needle, Target, Exercise
 void bind_case(pybind11::module_& module);      // Label, Case
+void bind_pose(pybind11::module_& module);      // pose: a module of functions
 void bind_truth(pybind11::module_& module);     // Truth
 void bind_renderer(pybind11::module_& module);  // Renderer, simd_targets, effect_names
 

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "numpy_values.h"
+#include "array_values.h"
 #include "runtime/imaging/doppler/doppler_view.h"
 
 namespace sonocase::python {

@@ -31,6 +31,11 @@ struct OpenedCase {
     std::atomic<bool> closed{false};
 };
 
+// An exercise and the bundle that holds it: probe and needle may have changed since, nothing else.
+struct CaseExercise : Exercise {
+    std::string case_path;
+};
+
 // Errors: a file that cannot be read or is not a bundle.
 Result<std::shared_ptr<OpenedCase>> open_case(const std::string& path);
 
@@ -39,6 +44,9 @@ Status usable(const OpenedCase& opened);
 
 // The exercise of that name; "" means the first, and where the bundle holds none, a free scan.
 Result<Exercise> exercise_named(const OpenedCase& opened, const std::string& name);
+
+// How far the skin is looked for, and over which ball its normal is averaged, unless said.
+constexpr double kSkinReachMm = 60, kSkinRadiusMm = 12;
 
 // Where one frame of a batch goes.
 struct FrameTask {

@@ -2,22 +2,21 @@
 
 // sonocase._core: what the Python package sonocase is made of. The stubs beside the package's
 // Python files (sonocase/__init__.pyi) describe every class for editors and type checkers.
+#include "array_values.h"
 #include "bindings.h"
-#include "numpy_values.h"
 #include "sonocase/version.h"
 
 PYBIND11_MODULE(_core, module) {
     using namespace sonocase::python;
     module.doc() = "Frames, labels and scores of case bundles; see the package sonocase.";
     module.attr("__version__") = SONOCASE_VERSION;
-    // The first major version of NumPy whose arrays this pybind11 does not know.
-    module.attr("_NUMPY_END") =
-        PYBIND11_VERSION_MAJOR * 100 + PYBIND11_VERSION_MINOR >= 212 ? 3 : 2;
     py::register_exception<OutsideError>(module, "Error").attr("__doc__") =
         "A failure of the outside world: one line that says what was found, where, and what was "
         "expected.";
+    bind_array(module);
     bind_exercise(module);
     bind_case(module);
+    bind_pose(module);
     bind_truth(module);
     bind_renderer(module);
 }

@@ -21,6 +21,8 @@ def _version():
 
 
 def _tag():
+    """Of one version of Python, since pybind11 looks into its structures and has no stable ABI, and of Linux in
+    general rather than of a manylinux, since the module links libraries that Debian brings."""
     python = f"cp{sys.version_info.major}{sys.version_info.minor}"
     return f"{python}-{python}-{re.sub('[-.]', '_', sysconfig.get_platform())}"
 
@@ -49,16 +51,7 @@ def _built(prefix, build):
     modules = list(pathlib.Path(prefix).rglob("sonocase/_core.*"))
     if len(modules) != 1 or f"cpython-{sys.version_info.major}{sys.version_info.minor}" not in modules[0].name:
         raise SystemExit(f"{build}: holds {[m.name for m in modules]}; expected a module for this Python")
-    return modules[0].parent, _numpy_end(pathlib.Path(build, "CMakeCache.txt").read_text())
-
-
-def _numpy_end(cache):
-    """The first major version of NumPy that the module cannot be used with: pybind11 knows NumPy 2
-    from 2.12 on. The module says the same (`_core._NUMPY_END`)."""
-    folder = re.search(r"^pybind11_DIR:\w+=(.+)$", cache, re.M).group(1)
-    version = re.search(r'PACKAGE_VERSION "(\d+)\.(\d+)',
-                        pathlib.Path(folder, "pybind11ConfigVersion.cmake").read_text())
-    return 3 if tuple(map(int, version.groups())) >= (2, 12) else 2
+    return modules[0].parent
 
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
@@ -72,12 +65,12 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     }
     name = f"sonocase-{version}-{tag}.whl"
     with tempfile.TemporaryDirectory() as prefix:
-        package, numpy_end = _built(prefix, (config_settings or {}).get("build"))
+        package = _built(prefix, (config_settings or {}).get("build"))
         files[f"{info}/METADATA"] = (
             f"Metadata-Version: 2.1\nName: sonocase\nVersion: {version}\n"
             "Summary: Ultrasound frames, labels and scores of case bundles\n"
             "License: Apache-2.0\nRequires-Python: >=3.9\n"
-            f"Requires-Dist: numpy>=1.24,<{numpy_end}\n")
+            "Requires-Dist: numpy>=1.24\n")
         for path in sorted(package.rglob("*")):
             if path.is_file():
                 files[str(path.relative_to(package.parent))] = path.read_bytes()

@@ -185,7 +185,9 @@ DOMAIN = {
                 "tissue_db": {"muscle": [-4, 4]}},
     "probe": {"depth_mm": {"one_of": [60, 90]}, "frequency_mhz": [2.5, 5]},
     "pose": {"press_mm": [0, 4]},
-    "needle": {"share": 0.5, "tip_depth_mm": [10, 30], "tent_mm": [0, 2]}}
+    "dynamic_range_db": [50, 70],
+    "needle": {"share": 0.5, "tip_depth_mm": [10, 30], "tent_mm": [0, 2], "gauge": [18, 22],
+               "make": ["chiba", "notched"]}}
 
 
 def test_a_sample_is_the_same_in_any_order_and_process(small):
@@ -219,6 +221,8 @@ def test_draws_fill_their_ranges(small):
     assert {(r["machine"]["base"], r["probe"]["depth_mm"]) for r in records} == \
         {(base, depth) for base in ("modern", "classic") for depth in (60, 90)}
     assert all(a["machine"] == b["machine"] for a, b in zip(records[::2], records[1::2]))
+    assert {r["needle"]["make"] for r in records} == {"chiba", "notched"}
+    assert all(18 <= r["needle"]["gauge"] <= 22 and 50 <= r["dynamic_range_db"] <= 70 for r in records)
     assert 15 < sum(r["mannequin_from_needle"] is not None for r in records) < 45
     assert all((r["mannequin_from_needle"] is None) == (r["dent_mm"] is None) for r in records)
 
@@ -236,7 +240,8 @@ def test_what_is_drawn_reaches_the_picture(small):
                    {"machine": {"gain": {"tgc_db_per_cm_mhz": 0.9}}}, {"probe": {"frequency_mhz": 7}},
                    {"probe": {"elevation_mm": 8}}, {"pose": {**still["pose"], "press_mm": 10}},
                    {"pose": {**still["pose"], "tilt_deg": 20}}, {"needle": {**still["needle"], "share": 0}},
-                   {"needle": {**still["needle"], "tent_mm": 6}}):
+                   {"needle": {**still["needle"], "tent_mm": 6}}, {"needle": {**still["needle"], "gauge": 10}},
+                   {"needle": {**still["needle"], "make": "notched"}}, {"dynamic_range_db": 40}):
         assert (drawn(change) != standard).any(), change
     # A machine's knob of contrast acts where its map is logarithmic.
     narrow, wide = (drawn({"machine": {"grey": {"map": "log", "dynamic_range_db": v}}}) for v in (40, 80))
@@ -263,7 +268,10 @@ def test_drawn_frames_go_into_the_writers(small, tmp_path):
     ({"gain_db": [0, float("nan")]}, "gain_db: .*finite"), ({"gain": 3}, "gain: .*gain_db"),
     ({"gain_db": {"one_of": []}}, "gain_db: .*empty"), ({"chunk": 0}, "chunk: 0"),
     ({"pose": {"press_mm": [-1, 2]}}, "pose.press_mm: .*0 to 40"), ({"pose": {"tilt": 3}}, "pose.tilt: .*tilt_deg"),
-    ({"needle": {"share": 2}}, "needle.share: "), ({"needle": 3}, "needle: "),
+    ({"needle": {"share": 2}}, "needle.share: "), ({"needle": {"gauge": 3}}, "needle.gauge: .*6 to 34"),
+    ({"needle": {"make": ["chiba", "gold"]}}, "needle.make: no make gold"), ({"needle": {"make": [1, 2]}}, "needle.make: "),
+    ({"dynamic_range_db": 10}, "dynamic_range_db: .*20 to 120"),
+    ({"dynamic_range_db": 50, "model": "paper"}, "dynamic_range_db: changes nothing"), ({"needle": 3}, "needle: "),
     ({"probe": {"depth_mm": [-5, 60]}}, "probe.depth_mm: "), ({"exercises": ["scam"]}, "scam"),
     ({"machine": {"grey": {"level": [40, 400]}}}, "machine.grey.level is 400"),
     ({"machine": {"grey": {"levle": 40}}}, "levle.*level"), ({"machine": "toaster"}, "toaster"),

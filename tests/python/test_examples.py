@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The programs of docs/examples/python, run on a small case as a reader would."""
 
+import importlib
 import pathlib
 import re
 import subprocess
@@ -62,6 +63,39 @@ def test_tiny_segmenter(small, case, pose, tmp_path):
     printed = run("tiny_segmenter.py", small[0], "scan", tmp_path).stdout
     median = float(re.search(r"2 real frames, median ([0-9.]+)", printed)[1])
     assert median > 0.8  # 0.5 is chance
+
+
+def disc_in_noise(random):
+    """A frame whose vessel is a dark disc in bright grain."""
+    v, u = np.mgrid[:192, :192]
+    inside = np.hypot(u - random.uniform(50, 142), v - random.uniform(50, 142)) < random.uniform(12, 25)
+    return np.where(inside, 30, random.integers(60, 255, (192, 192))).astype(np.uint8), inside
+
+
+def test_worth_of_images(tmp_path, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    worth = importlib.import_module("worth_of_images")
+    assert worth.area(np.array([0.1, 0.9, 0.5, 0.5]), np.array([False, True, True, False])) == 0.875
+    for kind in ("images", "masks"):
+        (tmp_path / kind).mkdir()
+    random = np.random.default_rng(3)
+    frames = [disc_in_noise(random) for _ in range(6)]
+    frames[5] = frames[4]  # one of the pool is one of the test
+    for n, (picture, inside) in enumerate(frames):
+        mask = np.zeros((192, 192, 3), np.uint8)
+        mask[..., 1] = 255 * inside
+        Image.fromarray(picture).save(tmp_path / "images" / f"{n}.png")
+        Image.fromarray(mask).save(tmp_path / "masks" / f"{n}.png")
+    monkeypatch.setattr(worth, "synthetic", lambda *_: tuple(zip(*[disc_in_noise(random) for _ in range(3)])))
+    monkeypatch.setattr(worth, "COUNTS", (0, 2))
+    worth.main("bundle", "exercise", tmp_path, 2)
+    printed = capsys.readouterr().out
+    assert printed.startswith("3 real frames to test, 2 to learn from")
+    rows = [list(map(float, re.findall(r"[0-9.]+", line))) for line in printed.splitlines()[3:]]
+    assert [row[0] for row in rows] == [0, 2] and rows[0][1] == 0.5
+    assert rows[0][3] > 0.9 and rows[1][1] > 0.9 and rows[1][3] > 0.9  # of a kind that a disc makes easy
+    with pytest.raises(SystemExit, match="at least four scenes"):
+        worth.main("bundle", "exercise", tmp_path / "none", 2)
 
 
 @pytest.mark.parametrize("name", sorted(path.name for path in EXAMPLES.glob("*.py")))

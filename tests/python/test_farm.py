@@ -46,7 +46,8 @@ def test_a_second_try_asks_by_what_the_first_took(tmp_path, monkeypatch):
 
 
 def test_the_page_says_what_is_faulty_what_failed_why_and_what_it_cost(tmp_path):
-    stages = [{"stage": "warp", "key": "a" * 32}, {"stage": "pack", "key": "b" * 32}]
+    stages = [{"stage": "warp", "key": "a" * 32, "seconds": 20.5, "why": "s.csv <new> changed"},
+              {"stage": "pack", "key": "b" * 32, "seconds": 2, "why": "after warp"}]
     names = ["good", "faulty", "unlooked", "stuck-1", "stuck-2"]
     plan = {"cases": [{"name": name, "recipe": name, "stages": stages} for name in names]}
     (tmp_path / "plan.json").write_text(json.dumps(plan))
@@ -66,13 +67,17 @@ def test_the_page_says_what_is_faulty_what_failed_why_and_what_it_cost(tmp_path)
     for name in names[3:]:
         (tmp_path / "logs" / name).mkdir(parents=True)
         (tmp_path / "logs" / name / "warp.log").write_text(f"== now\nsonocase build: {name}.nii: no such file\n")
+    (tmp_path / "logs" / "cache.log").write_text("6 entries, 12.0 MB; removed: 2 over the limit, 0 left by killed writers\n")
     done = subprocess.run([FARM / "index-page", tmp_path], capture_output=True, text=True)
     assert done.returncode == 1 and "1 with faults" in done.stdout
     page = (tmp_path / "index.html").read_text()
     assert "liver on the left: turn the map" in page and "no fault, 1 to note" in page
     assert page.count("not looked over") == 1
     assert "<b>2</b>: warp: sonocase build: CASE.nii: no such file" in page
-    assert "Work in them: 96 s (warp 90, pack 6)" in page
+    # Of the two that are not built all is to come.
+    assert "Work in them: 96 s (warp 90, pack 6); to come: about 45 s of processors" in page
+    assert page.count("<li>warp: s.csv &lt;new&gt; changed</li>") == 5 and "after warp" not in page
+    assert "Cache: 6 entries, 12.0 MB; removed: 2 over the limit" in page
 
 
 @needs_snakemake

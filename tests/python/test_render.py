@@ -3,6 +3,7 @@
 
 import json
 import pathlib
+import pickle
 import subprocess
 import sys
 import threading
@@ -155,7 +156,7 @@ def bad_poses():
     return [(mirror, ValueError, "mirrors"), (skewed, ValueError, "not a rigid motion"),
             (2 * np.eye(4), ValueError, "last row"), (holed, ValueError, "not finite"),
             (flat, ValueError, "last row"), (np.eye(3), ValueError, "(3, 3)"),
-            (np.zeros((1, 4, 4)), ValueError, "(1, 4, 4)"), ("pose", TypeError, "<U4"),
+            (np.zeros((1, 4, 4)), ValueError, "(1, 4, 4)"), ("pose", TypeError, "type str"),
             (None, TypeError, "pose"), (np.eye(4, dtype=complex), TypeError, "complex"),
             ([[1, 2], [3]], (TypeError, ValueError), "pose")]
 
@@ -245,6 +246,8 @@ def test_one_renderer_is_for_one_thread_at_a_time(case, pose):
             renderer.render(pose)
         except RuntimeError as error:
             refused.append(str(error))
+            with pytest.raises(RuntimeError, match="another thread"):
+                renderer.close()
     thread.join()
     assert refused and "another thread" in refused[0]
     renderer.render(pose)  # and works again
@@ -298,3 +301,116 @@ def test_pressing_gives_force_and_moves_what_truth_says(case, pose):
             renderer.render(pose, press_mm=bad)
     with pytest.raises(ValueError, match="press_mm: give one number, or one per pose"):
         renderer.render_batch(np.stack([pose, pose]), press_mm=[1, 2, 3])
+
+
+def test_a_renderer_is_closed_by_itself_or_at_the_end_of_a_block(case, pose):
+    with sonocase.Renderer(case, size=(32, 32)) as renderer:
+        renderer.render(pose)
+        assert not renderer.closed
+    assert renderer.closed and not case.closed and renderer.size == (32, 32)
+    renderer.close()  # again: nothing
+    for use in (lambda: renderer.render(pose), lambda: renderer.truth(), lambda: renderer.mm_per_px,
+                lambda: renderer.render_batch(np.stack([pose] * 2)), lambda: renderer.aimed(pose),
+                lambda: renderer.render(pose, mode="colour"), lambda: pickle.dumps(renderer),
+                lambda: renderer.skipped_effects):
+        with pytest.raises(sonocase.Error, match="the renderer is closed"):
+            use()
+    assert sonocase.Renderer(case, size=(32, 32)).render(pose).any()
+
+
+def test_a_renderer_goes_to_a_loaders_workers(small, case, pose, monkeypatch, tmp_path):
+    """Each start method of multiprocessing pickles: the same pixels of whatever it was asked for."""
+    exercise = case.exercise("scan")
+    exercise.probe.depth_mm, exercise.needle.gauge, exercise.needle.make = 80, 14, "notched"
+    machine = tmp_path / "mine.toml"
+    machine.write_text('[machine]\nbase = "modern"\n[machine.grey]\nlevel = 55\n')
+    monkeypatch.chdir(small[0].parent)
+    opened = sonocase.Case.open(small[0].name)  # by a path that means something here alone
+    needle = sonocase.Pose.looking((20, 0, 43), (-8, 0, -9))
+    renderers = [sonocase.Renderer(opened, exercise, size=(48, 40), seed=3, effects=["all", "-haze"], looks=2),
+                 sonocase.Renderer(opened, model="paper", size=(32, 32), scanlines=64, samples=100),
+                 sonocase.Renderer(opened, "scan", sonocase.Probe(depth_mm=60), sonocase.Needle(gauge=20),
+                                   machine=str(machine), renderer="reference", size=(24, 24))]
+    expected = [renderer.render(pose, needle) for renderer in renderers]
+    sent = pickle.dumps((renderers, opened, exercise, exercise.probe, exercise.needle))
+    program = ("import pickle, sys; r, case, e, p, n = pickle.loads(sys.stdin.buffer.read()); import numpy as np; "
+               f"pose, needle = np.array({pose.tolist()}), np.array({needle.tolist()}); "
+               "assert e.probe.depth_mm == p.depth_mm == 80 and e.needle.gauge == n.gauge == 14 and n.make == 'notched'; "
+               "assert case.name == 'cylinder' and r[2].exercise.probe.depth_mm == 60; "
+               "sys.stdout.buffer.write(b''.join(x.render(pose, needle).tobytes() for x in r))")
+    shown = subprocess.run([sys.executable, "-c", program], input=sent, capture_output=True, cwd="/")
+    assert shown.returncode == 0, shown.stderr.decode()
+    assert shown.stdout == b"".join(e.tobytes() for e in expected)
+    small_copy = tmp_path / "gone.sonocase"
+    small_copy.write_bytes(small[0].read_bytes())
+    sent = pickle.dumps(sonocase.Renderer(sonocase.Case.open(small_copy), size=(16, 16)))
+    small_copy.unlink()
+    with pytest.raises(sonocase.Error, match="no such file.*gone.sonocase|gone.sonocase.*no such file"):
+        pickle.loads(sent)
+
+
+def test_needle_and_contrast_are_the_callers(case, pose):
+    needle = sonocase.Pose.looking((20, 0, 43), (-8, 0, -9))
+    shown = {}
+    for name, chosen in (("own", None), ("thick", sonocase.Needle(gauge=8)), ("thin", sonocase.Needle(gauge=25)),
+                         ("notched", sonocase.Needle(make="notched", gauge=8))):
+        renderer = sonocase.Renderer(case, model="physical", needle=chosen, size=(96, 80))
+        shown[name] = renderer.render(pose, needle)
+        assert chosen is None or renderer.exercise.needle.gauge == chosen.gauge
+    for a, b in (("thick", "thin"), ("thick", "notched"), ("own", "thick")):
+        assert (shown[a] != shown[b]).any(), (a, b)
+    own = case.exercise().needle
+    own.diameter_mm = 3
+    assert own.diameter_mm == 3
+    own.gauge = 18
+    assert own.diameter_mm == pytest.approx(1.27, abs=0.03)  # ISO 9626
+    renderer = sonocase.Renderer(case, model="physical", size=(96, 80))
+    narrow, standard, wide = (renderer.render(pose, dynamic_range_db=v) for v in (30, 60, 100))
+    np.testing.assert_array_equal(standard, renderer.render(pose))
+    inside = standard > 0
+    # Fewer decibels from black to white: the same echoes lie further apart.
+    assert narrow[inside].std() > standard[inside].std() > wide[inside].std()
+    batch = renderer.render_batch(np.stack([pose]), dynamic_range_db=30)
+    np.testing.assert_array_equal(batch[0], narrow)
+
+
+@pytest.mark.parametrize("make, words", [
+    (lambda: sonocase.Probe(depth_mm=-3), "depth_mm: -3 is out of range: give 1 to 500"),
+    (lambda: sonocase.Probe(depth_mm=float("nan")), "depth_mm: nan is out of range"),
+    (lambda: sonocase.Probe(focus_mm=-1), "focus_mm: -1 "), (lambda: sonocase.Probe(width_mm=0), "width_mm: 0 "),
+    (lambda: sonocase.Probe(elevation_mm=-1), "elevation_mm: -1 "),
+    (lambda: setattr(sonocase.Probe(), "frequency_mhz", 500), "frequency_mhz: 500 "),
+    (lambda: setattr(sonocase.Probe(), "field_of_view_rad", 70), "field_of_view_rad: 70 "),
+    (lambda: sonocase.Needle(gauge=3), "gauge: 3 is out of range: give 6 to 34"),
+    (lambda: sonocase.Needle(length_mm=-1), "length_mm: -1 "), (lambda: sonocase.Needle(diameter_mm=-1), "diameter_mm: -1 "),
+    (lambda: setattr(sonocase.Needle(), "make", "gold"), "no make gold; give one of chiba")])
+def test_numbers_that_no_probe_or_needle_has_are_refused_where_they_are_given(make, words):
+    with pytest.raises(ValueError) as raised:
+        make()
+    assert words in str(raised.value)
+
+
+def test_a_pose_in_metres_is_refused(case, pose):
+    renderer = sonocase.Renderer(case, size=(32, 32))
+    metres = pose.copy()
+    metres[:3, 3] /= 1000
+    for use in (lambda: renderer.render(metres), lambda: renderer.render(metres, mode="colour")):
+        with pytest.raises(ValueError, match="pose: .*millimetres, not in metres"):
+            use()
+    with pytest.raises(ValueError, match=r"poses\[1\]: .*millimetres"):
+        renderer.render_batch(np.stack([pose, metres]))
+    renderer.render(np.eye(4))  # a face at the very origin is somebody's choice
+    for bad in (10, 121, float("nan")):
+        with pytest.raises(ValueError, match="dynamic_range_db: .*20 to 120"):
+            renderer.render(pose, dynamic_range_db=bad)
+
+
+def test_what_a_frame_did_without_is_said(case, pose):
+    renderer = sonocase.Renderer(case, model="physical", size=(32, 32), effects=["all", "-parenchyma"])
+    renderer.render(pose)
+    skipped = renderer.skipped_effects
+    assert skipped["parenchyma"] == "switched off" and all(isinstance(why, str) and why for why in skipped.values())
+    with pytest.raises(sonocase.Error, match="beams"):
+        sonocase.Renderer(case, scanlines=-1)
+    with pytest.raises(sonocase.Error, match="looks"):
+        sonocase.Renderer(case, looks=40)

@@ -2,6 +2,7 @@
 
 #include "runtime/player/headless/dataset_recipe.h"
 
+#include "formats/exercise/exercise.h"
 #include "formats/text/toml_reader.h"
 
 namespace sonocase::runtime::inline player_headless {
@@ -47,7 +48,7 @@ void read_machine(const TomlTable& table, DatasetRecipe& r) {
 
 void read_needle(const TomlTable& table, DatasetRecipe& r) {
     table.number("share", r.needle_share, 0, 1);
-    table.numbers("gauge", r.gauges, 6, 34, 1, 64);
+    table.numbers("gauge", r.gauges, kMinGauge, kMaxGauge, 1, 64);
     read_range(table, "tip_depth_mm", r.tip_depth_mm, 0, 500);
     read_range(table, "angle_deg", r.needle_angle_deg, 0, 89);
     table.number("off_plane_mm", r.off_plane_mm, 0, 100);

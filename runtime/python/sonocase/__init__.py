@@ -9,19 +9,14 @@
 Millimetres, seconds, radians; right-handed frames; poses are 4 x 4 arrays `mannequin_from_probe`
 (x along the face, y across it, z into the body). Failures of the outside world raise
 `sonocase.Error` with one line that says what, where and what was expected.
+
+Arrays are NumPy's, of any version, where it can be imported, and `sonocase.Array` otherwise.
+Arguments are arrays of any library that has the buffer protocol, `__array_interface__` or DLPack.
 """
-
-import numpy as _numpy
-
-from . import _core
-
-if int(_numpy.__version__.split(".")[0]) >= _core._NUMPY_END:
-    raise ImportError(f"sonocase was built for NumPy below {_core._NUMPY_END}, and this is "
-                      f"{_numpy.__version__}: pip install 'numpy<{_core._NUMPY_END}', or build the "
-                      "package with pybind11 2.12 or later")
 
 from . import pose as Pose
 from ._core import (
+    Array,
     Case,
     Error,
     Exercise,
@@ -35,7 +30,7 @@ from ._core import (
 )
 
 __all__ = [
-    "Case", "Error", "Exercise", "Label", "Needle", "Pose", "Probe", "Renderer", "Target",
+    "Array", "Case", "Error", "Exercise", "Label", "Needle", "Pose", "Probe", "Renderer", "Target",
     "__version__", "read_session", "score", "simd_targets",
 ]
 

@@ -18,6 +18,21 @@ NeedleArray = Union[npt.ArrayLike, tuple[npt.ArrayLike, npt.ArrayLike], None]
 
 class Error(Exception): ...
 
+# What stands for NumPy's arrays below where NumPy cannot be imported.
+class Array:
+    shape: tuple[int, ...]
+    dtype: str
+    nbytes: int
+    def __init__(self, shape: Sequence[int], dtype: str = ...) -> None: ...
+    def __len__(self) -> int: ...
+    def __getitem__(self, index: Union[int, tuple[int, ...]]) -> Any: ...
+    def tolist(self) -> Any: ...
+    @property
+    def __array_interface__(self) -> dict[str, Any]: ...
+    def __dlpack__(self, *, stream: None = ..., max_version: Optional[tuple[int, int]] = ...,
+                   dl_device: Optional[tuple[int, int]] = ..., copy: Optional[bool] = ...) -> Any: ...
+    def __dlpack_device__(self) -> tuple[int, int]: ...
+
 class Label:
     name: str
     tissue: str
@@ -41,6 +56,8 @@ class Needle:
     gauge: float
     diameter_mm: float
     length_mm: float
+    def __init__(self, *, make: str = ..., gauge: float = ..., diameter_mm: float = ...,
+                 length_mm: float = ...) -> None: ...
 
 class Target:
     name: str
@@ -97,19 +114,26 @@ class TruthPlanes:
 
 class Renderer:
     size: tuple[int, int]
+    closed: bool
     contact: bool
     press: dict[str, Any]
+    skipped_effects: dict[str, str]
     exercise: Exercise
     mm_per_px: float
     origin_px: tuple[float, float]
     def __init__(self, case: Case, exercise: Union[str, Exercise, None] = ...,
-                 probe: Optional[Probe] = ..., *, model: str = ..., machine: str = ...,
-                 effects: Union[str, Sequence[str], None] = ..., size: tuple[int, int] = ...,
-                 seed: int = ..., renderer: str = ...) -> None: ...
+                 probe: Optional[Probe] = ..., needle: Optional[Needle] = ..., *, model: str = ...,
+                 machine: str = ..., effects: Union[str, Sequence[str], None] = ...,
+                 size: tuple[int, int] = ..., seed: int = ..., renderer: str = ...,
+                 scanlines: int = ..., samples: int = ..., looks: int = ...) -> None: ...
+    def close(self) -> None: ...
+    def __enter__(self) -> Renderer: ...
+    def __exit__(self, *args: Any) -> None: ...
     def render(self, pose: PoseArray, needle: NeedleArray = ..., time_s: float = ..., *,
-               frame: int = ..., gain_db: float = ..., press_mm: float = ...,
+               frame: int = ..., gain_db: float = ..., dynamic_range_db: float = ...,
+               press_mm: float = ...,
                dent: Optional[npt.ArrayLike] = ...,
-               out: Optional[npt.NDArray[np.uint8]] = ..., mode: str = ...,
+               out: Any = ..., mode: str = ...,
                doppler: dict[str, Any] = ...) -> npt.NDArray[np.uint8]: ...
     def aimed(self, pose: PoseArray) -> dict[str, float]: ...
     @property
@@ -117,9 +141,10 @@ class Renderer:
     # With truth: (pictures, TruthPlanes, list of facts).
     def render_batch(self, poses: npt.ArrayLike, needles: Optional[Sequence[NeedleArray]] = ...,
                      times_s: Optional[npt.ArrayLike] = ..., *, first_frame: int = ...,
-                     gain_db: float = ..., press_mm: npt.ArrayLike = ...,
+                     gain_db: float = ..., dynamic_range_db: float = ...,
+                     press_mm: npt.ArrayLike = ...,
                      dents: Optional[Sequence[Optional[npt.ArrayLike]]] = ...,
-                     out: Optional[npt.NDArray[np.uint8]] = ...,
+                     out: Any = ...,
                      threads: int = ..., truth: Optional[Sequence[str]] = ...) -> Any: ...
     def truth(self, planes: Iterable[str] = ...) -> tuple[TruthPlanes, dict[str, Any]]: ...
 

@@ -27,19 +27,20 @@ import tempfile
 
 import numpy as np
 
+from . import _core
 from . import pose as _pose
 from ._core import Case, Error, Probe, Renderer
 from .data import common_classes
 
-# Keys of a probe with their limits.
-PROBE = {"shape": None, "radius_mm": (1, 1000), "field_of_view_rad": (0.01, 6), "width_mm": (1, 1000),
-         "depth_mm": (1, 1000), "frequency_mhz": (0.5, 50), "focus_mm": (0, 1000),
-         "elevation_mm": (0, 100)}
+# Keys of a probe, and of a needle beside where it goes, with their limits: those of an exercise's file.
+PROBE = {"shape": None, **_core._PROBE_LIMITS}
+NEEDLE = {"make": None, "gauge": _core._GAUGE_LIMITS}
 PLANES = ("labels", "needle", "shadowed", "skin_depth_mm")
 
 # What a sample draws beside machine and probe: standard, and limits.
 _SAMPLE = {
     "gain_db": (0.0, -60, 60),
+    "dynamic_range_db": (60.0, 20, 120),
     "pose.slide_mm": ([-15, 15], -500, 500),   # along the face and across it, one draw each
     "pose.tilt_deg": ([-15, 15], -90, 90),
     "pose.rock_deg": ([-10, 10], -90, 90),
@@ -54,6 +55,7 @@ _SAMPLE = {
     "needle.tent_mm": (0.0, 0, 50),
     "needle.drag_mm": (0.0, 0, 50),
 }
+_CONSOLE = ("gain_db", "dynamic_range_db")
 _TABLES = ("machine", "probe", "pose", "needle")
 _OTHERS = ("chunk", "exercises", "model")
 # The machine's reader takes these as whole numbers alone.
@@ -94,7 +96,7 @@ class _Choice:
             if _is_number(value) and not math.isfinite(value):
                 raise ValueError(f"{key}: {value} is not finite")
             if limits is not None and not limits[0] <= value <= limits[1]:
-                raise ValueError(f"{key}: {value} is out of range: give {limits[0]} to {limits[1]}")
+                raise ValueError(f"{key}: {value} is out of range: give {limits[0]:g} to {limits[1]:g}")
         if self.options is None:
             if self.low > self.high:
                 raise ValueError(f"{key}: the range {[*given]} is reversed: give its lower end first")
@@ -138,15 +140,16 @@ def _refuse_unknown(key, known):
 class Domain:
     """What is drawn and from which ranges: a checked description, a plain dict as JSON or TOML give it.
 
-    chunk       samples that share case, exercise, model, machine and probe, whose change costs as
-                much as several frames; 16 by default
+    chunk       samples that share case, exercise, model, machine, probe and the needle's make, whose
+                change costs as much as several frames; 16 by default
     exercises   names; by default all of the case
     model       "physical" or "paper"; by default the exercise's
     machine     names or paths, or a table: base and any key of a machine (formats/machine)
     probe       keys of sonocase.Probe, in place of the exercise's
     pose        slide_mm, tilt_deg, rock_deg, rotate_deg, press_mm, time_s
-    needle      share, tip_depth_mm, tip_across_mm, angle_deg, off_plane_mm, tent_mm, drag_mm
-    gain_db
+    needle      share, tip_depth_mm, tip_across_mm, angle_deg, off_plane_mm, tent_mm, drag_mm; make
+                and gauge, in place of the exercise's
+    gain_db, dynamic_range_db   of the console
 
     Each but chunk is a value, [lowest, highest] or {"one_of": [...]}; a list of words is a choice.
     """
@@ -155,16 +158,21 @@ class Domain:
         if not isinstance(description, dict):
             raise ValueError("description: expected a dict")
         for key in description:
-            _refuse_unknown(key, [*_OTHERS, *_TABLES, "gain_db"])
+            _refuse_unknown(key, [*_OTHERS, *_TABLES, *_CONSOLE])
         self.description = json.loads(json.dumps(description))
         self.chunk = description.get("chunk", 16)
         if not isinstance(self.chunk, int) or isinstance(self.chunk, bool) or self.chunk < 1:
             raise ValueError(f"chunk: {self.chunk!r} is no whole number from 1 on")
-        given = {"gain_db": description["gain_db"]} if "gain_db" in description else {}
+        given = {key: description[key] for key in _CONSOLE if key in description}
         for table in ("pose", "needle"):
             given.update({key: value for key, _, value in _leaves(description.get(table, {}), table)})
+        self.needle = {name: _Choice(f"needle.{name}", given.pop(f"needle.{name}"), limits)
+                       for name, limits in NEEDLE.items() if f"needle.{name}" in given}
+        for make in self.needle["make"].options or [None] if "make" in self.needle else ():
+            if make not in _core._NEEDLE_MAKES:
+                raise ValueError(f"needle.make: no make {make}: give some of {', '.join(_core._NEEDLE_MAKES)}")
         for key in given:
-            _refuse_unknown(key, list(_SAMPLE))
+            _refuse_unknown(key, [*_SAMPLE, *(f"needle.{name}" for name in NEEDLE)])
         self.sample = {key: _Choice(key, given.get(key, standard), limits)
                        for key, (standard, *limits) in _SAMPLE.items()}
         self.dents = "needle.tent_mm" in given or "needle.drag_mm" in given
@@ -227,19 +235,19 @@ def _toml(table, name):
     return lines
 
 
-def _renderer(case, exercise, model, machine, probe, size, seed):
+def _renderer(case, exercise, model, machine, probe, size, seed, needle=None):
     options = {"model": model, "size": tuple(size), "seed": seed}
     exercise = case.exercise(exercise)
-    changed = exercise.probe
-    for name, value in probe.items():
-        setattr(changed, name, value)
+    for part, changes in ((exercise.probe, probe), (exercise.needle, needle or {})):
+        for name, value in changes.items():
+            setattr(part, name, value)
     if not isinstance(machine, dict):
-        return Renderer(case, exercise, changed, machine=machine, **options)
+        return Renderer(case, exercise, machine=machine, **options)
     with tempfile.TemporaryDirectory() as folder:  # a machine is given by name or as a file
         path = os.path.join(folder, "machine.toml")
         pathlib.Path(path).write_text("\n".join(_toml(machine, "machine")) + "\n", "utf-8")
         try:
-            return Renderer(case, exercise, changed, machine=path, **options)
+            return Renderer(case, exercise, machine=path, **options)
         except Error as error:
             said = re.sub(re.escape(path) + r"(:\d+)?:? *", "", str(error))
             raise ValueError(said) from None
@@ -249,14 +257,15 @@ def renderer_of(record, case=None):
     """The renderer that drew a record's picture; `case` instead of opening the one that it names."""
     case = case or Case.open(record["case"])
     return _renderer(case, record["exercise"], record["model"], record["machine"], record["probe"],
-                     record["size"], record["seed"])
+                     record["size"], record["seed"], record["needle"])
 
 
 def picture(record, renderer=None):
     """The picture of a record, as it was; `renderer` of the same chunk, to make many."""
     return (renderer or renderer_of(record)).render(
         record["mannequin_from_probe"], record["mannequin_from_needle"], record["time_s"],
-        frame=record["noise_frame"], gain_db=record["gain_db"], press_mm=record["press_mm"],
+        frame=record["noise_frame"], gain_db=record["gain_db"],
+        dynamic_range_db=record["dynamic_range_db"], press_mm=record["press_mm"],
         dent=record["dent_mm"])
 
 
@@ -333,6 +342,8 @@ class DrawnFrames:
             {case.exercise(name).model for case in cases for name in self._exercises(case).options}
         if "machine" in self.domain.description and models == {"paper"}:
             raise ValueError("machine: changes nothing in the model paper: give model = \"physical\"")
+        if "dynamic_range_db" in self.domain.description and models == {"paper"}:
+            raise ValueError("dynamic_range_db: changes nothing in the model paper: give model = \"physical\"")
         labels = [f"machine.tissue_db.{label.name}" for case in cases for label in case.labels]
         for key in machine:
             if key.startswith("machine.tissue_db."):
@@ -380,7 +391,8 @@ class DrawnFrames:
         probe.update({name: draw(c) for name, c in self.domain.probe.items()})
         common = {"chunk": number, "case": path, "exercise": exercise.name,
                   "model": draw(self.domain.model) if self.domain.model else exercise.model,
-                  "machine": self.domain.machine_of(draw), "probe": probe, "size": list(self.size),
+                  "machine": self.domain.machine_of(draw), "probe": probe,
+                  "needle": {name: draw(c) for name, c in self.domain.needle.items()}, "size": list(self.size),
                   "seed": self.seed}
         renderer = renderer_of(common, case)
         common.update(mm_per_px=renderer.mm_per_px, origin_px=list(renderer.origin_px))
@@ -414,7 +426,7 @@ class DrawnFrames:
             if self.domain.dents:
                 dent = [drawn["needle.tent_mm"], drawn["needle.drag_mm"]]
         return _plain({"index": i, **common, "noise_frame": i, "time_s": drawn["pose.time_s"],
-                       "gain_db": drawn["gain_db"], "press_mm": drawn["pose.press_mm"],
+                       **{key: drawn[key] for key in _CONSOLE}, "press_mm": drawn["pose.press_mm"],
                        "mannequin_from_probe": pose, "mannequin_from_needle": needle, "dent_mm": dent})
 
     def __getitem__(self, i):

@@ -129,9 +129,10 @@ struct Farm {
         folder.write("l.nrrd", "labels");
         folder.write("s.csv", "surface");
     }
-    CasePlan plan() const {
-        auto plans = plan_cases({recipe}, {}, out);
+    CasePlan plan(const RecipeOverrides& overrides = {}, bool dry = false) const {
+        auto plans = plan_cases({recipe}, overrides, out, {.dry = dry, .speed = 1});
         EXPECT_TRUE(plans.has_value()) << plans.error().message();
+        if (!dry) folder.write("farm/plan.json", plan_json(*plans, overrides));
         return (*plans)[0];
     }
     // What the jobs would leave if they had run.
@@ -194,13 +195,105 @@ TEST(PlanCases, BadRecipeIsItsCasesFaultAlone) {
     const std::string twin = farm.folder.write("twin.toml", kRecipe);
     const std::string path =
         farm.folder.write("path.toml", "name = \"../x\"\n" + kRecipe.substr(kRecipe.find('[')));
-    const auto plans = plan_cases({farm.recipe, typo, missing, twin, path}, {}, farm.out);
+    const auto plans =
+        plan_cases({farm.recipe, typo, missing, twin, path}, {}, farm.out, {.speed = 1});
     ASSERT_TRUE(plans.has_value());
     EXPECT_EQ((*plans)[0].error, "");
     EXPECT_NE((*plans)[1].error.find("unknown key 'nam'"), std::string::npos);
     EXPECT_NE((*plans)[2].error.find("no such file"), std::string::npos);
     EXPECT_NE((*plans)[3].error.find("another case is called 'one'"), std::string::npos);
     EXPECT_NE((*plans)[4].error.find("file name"), std::string::npos);
+}
+
+std::map<std::string, std::string> reasons(const CasePlan& plan) {
+    std::map<std::string, std::string> why;
+    for (std::size_t i = 0; i < plan.stages.size(); ++i)
+        if (!plan.needs[i].done) why[plan.stages[i].stage] = plan.needs[i].why;
+    return why;
+}
+
+RecipeOverrides with(const std::string& set) {
+    RecipeOverrides overrides;
+    overrides.sets = {set};
+    return overrides;
+}
+
+using Reasons = std::map<std::string, std::string>;
+
+TEST(PlanCases, WhatIsStaleSaysWhy) {
+    const Farm farm;
+    for (const auto& [stage, why] : reasons(farm.plan())) EXPECT_EQ(why, "not built yet") << stage;
+    farm.finish();
+    EXPECT_EQ(reasons(farm.plan()), Reasons{});
+    farm.folder.write("s.csv", "SURFACE");
+    const Reasons surface{{"flow", "after resample"},    {"pack", "s.csv changed"},
+                          {"resample", "after warp"},    {"structure", "after resample"},
+                          {"texture", "after resample"}, {"warp", "s.csv changed"}};
+    EXPECT_EQ(reasons(farm.plan()), surface);
+    // Planned again before anything ran: what it was made of when it was done is not forgotten.
+    EXPECT_EQ(reasons(farm.plan()), surface);
+    farm.folder.write("s.csv", "surface");
+    farm.finish();
+    EXPECT_EQ(reasons(farm.plan(with("resample.voxel_mm=3"))).at("resample"),
+              "resample.voxel_mm = 3, was " + farm.plan().needs[3].made_of.at("resample.voxel_mm"));
+    // Taken back: as it was when it was done, but its result has gone.
+    EXPECT_EQ(reasons(farm.plan()).at("resample"), "did not finish");
+    farm.finish();
+    farm.folder.write("one.toml", kRecipe + "# a comment\n");
+    EXPECT_EQ(reasons(farm.plan()), (Reasons{{"pack", "recipe or exercises have changed"}}));
+    farm.finish();
+    fs::remove(farm.out + "/cases/one.sonocase");
+    EXPECT_EQ(reasons(farm.plan()),
+              (Reasons{{"pack", "the bundle is missing, or is not the one that was written"}}));
+    // A plan that cannot be read remembers nothing.
+    farm.folder.write("farm/plan.json", "{\"cases\": [3, {\"stages\": [3, {}]}]");
+    EXPECT_EQ(reasons(farm.plan()), (Reasons{{"pack", "not built yet"}}));
+}
+
+TEST(PlanCases, NewVersionOfAStageIsSaid) {
+    const Farm farm;
+    farm.finish();
+    std::string plan = *read_text_file(farm.out + "/plan.json");
+    const int version = farm.plan().stages[0].descriptor->version;
+    const std::string now = "\"version\": \"" + std::to_string(version) + "\"";
+    ASSERT_NE(plan.find(now), std::string::npos);
+    plan.replace(plan.find(now), now.size(), "\"version\": \"0\"");
+    // The key was that of the older version, too.
+    const std::string key = farm.plan().stages[0].plan_key;
+    plan.replace(plan.find(key), key.size(), "old");
+    fs::rename(farm.out + "/state/one/import." + key + ".json",
+               farm.out + "/state/one/import.old.json");
+    farm.folder.write("farm/plan.json", plan);
+    EXPECT_EQ(
+        reasons(farm.plan({}, true)).at("import"),
+        "the program computes it in another way (version " + std::to_string(version) + ", was 0)");
+}
+
+TEST(PlanCases, DryPlanWritesNothingAndSaysSecondsAndMegabytes) {
+    const Farm farm;
+    const CasePlan all = farm.plan({}, true);
+    EXPECT_FALSE(fs::exists(farm.out));
+    EXPECT_GT(all.processor_s(), 0);
+    EXPECT_GT(all.memory_mb(), 0);
+    farm.finish();
+    farm.plan();
+    farm.folder.write("s.csv", "SURFACE");
+    std::set<std::string> before, after;
+    for (const auto& entry : fs::recursive_directory_iterator(farm.out))
+        before.insert(entry.path().string());
+    const CasePlan part = farm.plan({}, true);
+    for (const auto& entry : fs::recursive_directory_iterator(farm.out))
+        after.insert(entry.path().string());
+    EXPECT_EQ(before, after);
+    // Import and surface stay, with a twentieth of the seconds.
+    EXPECT_NEAR(part.processor_s() / all.processor_s(), 0.95, 0.02);
+    for (std::size_t i = 0; i < part.stages.size(); ++i)
+        EXPECT_EQ(part.needs[i].done, part.needs[i].processor_s == 0);
+    const std::string text = plan_text({part});
+    EXPECT_NE(text.find("one: 6 of 8 stages, about "), std::string::npos) << text;
+    EXPECT_NE(text.find("    warp, pack: s.csv changed\n"), std::string::npos) << text;
+    EXPECT_NE(text.find("    resample, texture, structure, flow follow\n"), std::string::npos)
+        << text;
 }
 
 TEST(DigestMemo, RemembersOldFilesAndNeverFreshOnes) {

@@ -66,6 +66,19 @@ TEST(CommandLine, WrongUsageIsStatusTwoWithTheNearestVerb) {
     EXPECT_TRUE(folder.names().empty());
 }
 
+TEST(CommandLine, ASettingTakesOneWordAndLeavesTheRecipe) {
+    const TemporaryFolder folder;
+    folder.write("case.toml", kTinyRecipe);
+    for (const char* arguments :
+         {"build --list-options --set resample.voxel_mm=5 case.toml",
+          "plan -o farm --dry-run --set resample.voxel_mm=5 --set texture.edge=8 case.toml"}) {
+        const CommandResult run = sonocase_run(arguments, folder);
+        EXPECT_EQ(run.status, 0) << arguments << "\n" << run.error;
+    }
+    EXPECT_EQ(sonocase_run("build --set resample.voxel_mm=5 none.toml", folder).error.find("--set"),
+              std::string::npos);
+}
+
 TEST(CommandLine, EveryVerbHasHelp) {
     const TemporaryFolder folder;
     for (const char* verb :

@@ -1,31 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "numpy_values.h"
+#include "array_values.h"
 
 #include <cmath>
 #include <cstdio>
-#include <vector>
 
 namespace sonocase::python {
 namespace {
 
-using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
-
-std::string shape_text(const py::array& a) {
-    std::string text = "(";
-    for (py::ssize_t i = 0; i < a.ndim(); ++i)
-        text += (i > 0 ? ", " : "") + std::to_string(a.shape(i));
-    return text + (a.ndim() == 1 ? ",)" : ")");
-}
-
 // Three numbers.
 Vector3 triple(py::handle value, const char* name) {
-    const py::array a = numbers_from(value, name);
-    if (a.ndim() != 1 || a.shape(0) != 3)
-        throw py::value_error(std::string(name) + ": an array of shape " + shape_text(a) +
+    const Numbers a = numbers_from(value, name);
+    if (a.shape != Shape{3})
+        throw py::value_error(std::string(name) + ": an array of shape " + shape_text(a.shape) +
                               "; give three numbers, mm, frame `mannequin`");
-    const Doubles d(a);
-    const Vector3 v{d.data()[0], d.data()[1], d.data()[2]};
+    const Vector3 v{a.values[0], a.values[1], a.values[2]};
     if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z))
         throw py::value_error(std::string(name) + ": holds a number that is not finite");
     return v;
@@ -33,17 +22,16 @@ Vector3 triple(py::handle value, const char* name) {
 
 }  // namespace
 
-py::array numbers_from(py::handle value, const char* name) {
-    const py::array a = py::array::ensure(value);
-    if (!a) {
-        PyErr_Clear();
-        throw py::type_error(std::string(name) + ": not an array of numbers");
-    }
-    const char kind = a.dtype().kind();
-    if (kind != 'f' && kind != 'i' && kind != 'u')
-        throw py::type_error(std::string(name) + ": an array of dtype " +
-                             py::cast<std::string>(py::str(a.dtype())) + "; give real numbers");
-    return a;
+std::string absolute_path(const std::string& path) {
+    return py::cast<std::string>(py::module_::import("os.path").attr("abspath")(path));
+}
+
+double in_range(double value, const char* name, double min, double max) {
+    if (value >= min && value <= max) return value;
+    char text[160];
+    std::snprintf(text, sizeof text, "%s: %.6g is out of range: give %.6g to %.6g", name, value,
+                  min, max);
+    throw py::value_error(text);
 }
 
 Rigid rigid_from(const double* rows, const std::string& name) {
@@ -73,12 +61,11 @@ Rigid rigid_from(const double* rows, const std::string& name) {
 }
 
 Rigid rigid_from(py::handle value, const char* name) {
-    const py::array a = numbers_from(value, name);
-    if (a.ndim() != 2 || a.shape(0) != 4 || a.shape(1) != 4)
-        throw py::value_error(std::string(name) + ": an array of shape " + shape_text(a) +
+    const Numbers a = numbers_from(value, name);
+    if (a.shape != Shape{4, 4})
+        throw py::value_error(std::string(name) + ": an array of shape " + shape_text(a.shape) +
                               "; give 4 x 4, a rigid motion in mm");
-    const Doubles d(a);
-    return rigid_from(d.data(), name);
+    return rigid_from(a.values.data(), name);
 }
 
 Point3 point_from(py::handle value, const char* name) {
@@ -89,6 +76,13 @@ Vector3 vector_from(py::handle value, const char* name) {
     const Vector3 v = triple(value, name);
     if (!(norm(v) > 0)) throw py::value_error(std::string(name) + ": a direction of length 0");
     return v;
+}
+
+Rigid pose_along(Point3 face, Vector3 beam, Vector3 lateral) {
+    const Vector3 z = normalized(beam);
+    Vector3 x = lateral - dot(lateral, z) * z;
+    x = norm(x) > 1e-6 ? normalized(x) : any_perpendicular(z);
+    return {Matrix3::from_columns(x, cross(z, x), z), face - Point3{}};
 }
 
 void set_needle(py::handle needle, runtime::FrameInput& input) {
@@ -108,35 +102,37 @@ void set_needle(py::handle needle, runtime::FrameInput& input) {
 
 void set_dent(py::handle dent, runtime::FrameInput& input, const char* name) {
     if (dent.is_none()) return;
-    const py::array a = numbers_from(dent, name);
-    if (a.ndim() != 1 || a.shape(0) != 2)
+    const Numbers mm = numbers_from(dent, name);
+    if (mm.shape != Shape{2})
         throw py::value_error(std::string(name) + ": give two numbers, tent_mm and drag_mm");
-    const Doubles mm(a);
-    if (!std::isfinite(mm.at(0)) || !std::isfinite(mm.at(1)))
+    if (!std::isfinite(mm.values[0]) || !std::isfinite(mm.values[1]))
         throw py::value_error(std::string(name) + ": not finite");
-    input.needle.tent_mm = mm.at(0);
-    input.needle.drag_mm = mm.at(1);
+    input.needle.tent_mm = mm.values[0];
+    input.needle.drag_mm = mm.values[1];
 }
 
-py::array_t<double> array_of(const Rigid& pose) {
-    py::array_t<double> a({4, 4});
-    auto m = a.mutable_unchecked<2>();
+void copy_rows(const Rigid& pose, double* rows) {
     for (int r = 0; r < 3; ++r) {
-        for (int c = 0; c < 3; ++c) m(r, c) = pose.rotation(r, c);
-        m(r, 3) = pose.translation[r];
-        m(3, r) = 0;
+        for (int c = 0; c < 3; ++c) rows[4 * r + c] = pose.rotation(r, c);
+        rows[4 * r + 3] = pose.translation[r];
+        rows[12 + r] = 0;
     }
-    m(3, 3) = 1;
-    return a;
+    rows[15] = 1;
 }
 
-py::array_t<double> array_of(Vector3 v) {
-    py::array_t<double> a(3);
-    for (int i = 0; i < 3; ++i) a.mutable_at(i) = v[i];
-    return a;
+py::object array_of(const Rigid& pose) {
+    const auto array = new_array<double>({4, 4});
+    copy_rows(pose, array.data);
+    return array.object;
 }
 
-py::array_t<double> array_of(Point3 p) {
+py::object array_of(Vector3 v) {
+    const auto array = new_array<double>({3});
+    for (int i = 0; i < 3; ++i) array.data[i] = v[i];
+    return array.object;
+}
+
+py::object array_of(Point3 p) {
     return array_of(p - Point3{});
 }
 
