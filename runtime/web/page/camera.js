@@ -48,11 +48,12 @@ export class CameraTracker {
         this.words = element('p', '', {className: 'second'});
         this.words.setAttribute('role', 'status');
         const list = element('dl', '', {className: 'values'});
-        [this.delay, ...this.states] = [t('Predicted by'), t('Probe'), t('Needle')].map((name) => {
+        const [probe, needle, delay] = [t('Probe'), t('Needle'), t('Prediction')].map((name) => {
             const value = element('dd', '–');
             list.append(element('dt', name), value);
             return value;
         });
+        Object.assign(this, {states: [probe, needle], delay});
         const place = element('button', t('Probe is at the start'), {type: 'button', title: t('Hold the probe where the exercise begins; the picture goes there')});
         place.addEventListener('click', () => this.place());
         const file = element('input', '', {type: 'file', accept: '.json', hidden: true});
@@ -137,13 +138,14 @@ export class CameraTracker {
     close_stream() {
         for (const track of this.stream?.getTracks() ?? []) track.stop();
         this.stream = null;
+        this.waiting?.picture.close();
+        this.waiting = null;
         for (const state of this.states) state.textContent = '–';
     }
     stop() {
         this.stopped = true;
         this.close_stream();
         this.worker?.terminate();
-        this.waiting?.picture.close();
         if (this.changed) navigator.mediaDevices.removeEventListener('devicechange', this.changed);
         this.say_above('');
         this.room.replaceChildren();
@@ -221,6 +223,7 @@ export class CameraTracker {
             return;
         }
         this.hand_over();
+        if (!this.stream) return;  // of a camera that has gone meanwhile
         if (refused) this.say(this.said_by_program(refused));
         if (!tools) return;
         ++this.pictures;

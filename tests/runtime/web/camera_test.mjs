@@ -24,6 +24,7 @@ async function serve(of) {
     return {url: `http://127.0.0.1:${server.address().port}/`, stop: () => { server.closeAllConnections?.(); return new Promise((done) => server.close(done)); }};
 }
 const {url, stop} = await serve(site);
+let stopped = false;
 const kCamera = 'sonoplay.app.scan.camera', kRoom = 'document.getElementById("camera-room").innerText';
 const kNotice = 'document.getElementById("bar-notice").textContent';
 const kFiles = /\/camera(_worker)?\.(js|wasm)$/;
@@ -104,13 +105,13 @@ await run_tests({
             core.put_tools = (...all) => { taken.push(all.slice(1)); put.apply(core, all); };
         })()`);
         await page.until('taken.length > 30 && sonoplay.app.scan.values.has_needle');
-        // It was said to be at the start somewhere on its way of 21 mm; a prediction goes 8 mm farther at most.
+        // It was said to be at the start somewhere on its way of 21 mm; a prediction goes 8 mm farther at most, of either tool.
         for (const [probe, needle, states, tracker] of await page.value('taken')) {
             expect_equal(`${states.join()} ${tracker}`, 'good,good camera', 'state');
             expect(distance(probe, before) < 21 + 8, `the probe is ${distance(probe, before)} mm from where it was placed`);
             const apart = distance(probe, needle);
             const between = wanted.map(({tools}) => distance(tools[0].truth, tools[1].truth));
-            expect(apart > Math.min(...between) - 8 && apart < Math.max(...between) + 8, `the needle is ${apart} mm from the probe`);
+            expect(apart > Math.min(...between) - 16 && apart < Math.max(...between) + 16, `the needle is ${apart} mm from the probe`);
         }
         const ways = (await page.value('taken')).map(([probe]) => distance(probe, before));
         expect(Math.max(...ways) - Math.min(...ways) > 5, 'it moves');
@@ -191,7 +192,7 @@ await run_tests({
         await place(page);
         await page.until('sonoplay.app.scan.values.has_needle');
         const said = await page.value(`(() => {
-            const {camera} = sonoplay.app.scan, [probe, needle] = camera.newest.tools;
+            const {camera} = sonoplay.app.scan, [probe, needle] = globalThis.tools = camera.newest.tools;
             for (let n = 0; n < 5; ++n) camera.answered({tools: [{...probe, status: 'lost'}, needle], message: null, taken_ms: 0, at_ms: 0, took_ms: 1});
             return [${kNotice}, ${kRoom}];
         })()`);
@@ -200,6 +201,9 @@ await run_tests({
         // As when it is unplugged: the browser ends the track.
         await browser.send('Browser.setPermission', {permission: {name: 'camera'}, setting: 'denied', origin: url, browserContextId: page.context});
         await page.until(`[${kRoom}, ${kNotice}].every((words) => words.includes('was unplugged, or is no longer allowed'))`);
+        // A picture that the worker had then changes nothing.
+        await page.value(`${kCamera}.answered({tools, message: null, taken_ms: 0, at_ms: 0, took_ms: 1})`);
+        expect((await page.value(kNotice)).includes('was unplugged') && !(await page.value(kRoom)).includes('Good'), 'the sentence stays');
         await page.until('!sonoplay.app.scan.values.has_needle', 10);  // its pose is too old
         await browser.send('Browser.setPermission', {permission: {name: 'camera'}, setting: 'granted', origin: url, browserContextId: page.context});
         const {pictures} = await page.value(`({pictures: ${kCamera}.pictures})`);
@@ -224,10 +228,12 @@ await run_tests({
         await page.until('navigator.serviceWorker.controller');
         await follows(page);
         await stop();
+        stopped = true;
         await page.open(`${url}?case=small`);
         await page.until('sonoplay.app.scan.frames > 0');
         await follows(page);
         await page.close();
     },
 });
+if (!stopped) await stop();
 await browser.stop();

@@ -75,9 +75,11 @@ if (camera) {
             };
             step();
         })`);
-        const median = (ms) => [...ms].sort((a, b) => a - b)[ms.length >> 1]?.toFixed(1);
-        console.log(`camera ${on ? 'on' : 'off'}: ${rates[0].toFixed(1)} pictures of the ultrasound a second, median ${median(frame_ms)} ms each`);
-        if (on) console.log(`    ${rates[1].toFixed(1)} of the camera, median ${median(took)} ms each, ${median(late)} ms after they were taken`);
+        // The fastest tenth too: others may use the machine.
+        const part = (ms, of) => [...ms].sort((a, b) => a - b)[Math.floor(of * ms.length)]?.toFixed(1);
+        const said = (ms) => `median ${part(ms, 0.5)} ms, a tenth within ${part(ms, 0.1)} ms`;
+        console.log(`camera ${on ? 'on' : 'off'}: ${rates[0].toFixed(1)} pictures of the ultrasound a second, each ${said(frame_ms)}`);
+        if (on) console.log(`    ${rates[1].toFixed(1)} of the camera, each ${said(took)}; poses come after ${said(late)}`);
     }
     await browser.stop();
     server.closeAllConnections?.();
