@@ -43,6 +43,12 @@ PageSession::PageSession(const CaseBundle& bundle,
     if (seed != 0) session_.header.attempt = "seed=" + std::to_string(seed);
 }
 
+void PageSession::moved_by(const std::string& tracker) {
+    std::string& attempt = session_.header.attempt;
+    if (!detail_value(attempt, "tracker").empty()) return;
+    attempt += (attempt.empty() ? "tracker=" : " tracker=") + tracker;
+}
+
 void PageSession::observe(const FrameRecord& record) {
     const FrameInput& input = record.input;
     SessionSample sample;
@@ -253,7 +259,10 @@ Status PagePlayer::set_image(const PageImage& image) {
     return Done{};
 }
 
-void PagePlayer::put_tools(double now_s, const TrackerReading& reading) {
+void PagePlayer::put_tools(double now_s,
+                           const TrackerReading& reading,
+                           const std::string& tracker) {
+    if (session_ && !tracker.empty()) session_->moved_by(tracker);
     TrackerReading moved;
     (void)hands_->poll(now_s, moved);  // what the hands did before is applied
     engine_->observe(reading, true);

@@ -47,6 +47,8 @@ class PageSession {
 
     // Another engine of the same exercise goes on.
     void use(const ScanEngine& engine) { anatomy_ = engine.anatomy(); }
+    // A tracker moves the tools: the recording names it.
+    void moved_by(const std::string& tracker);
     // Takes the frame that the engine just rendered.
     void observe(const FrameRecord& record);
 
@@ -166,7 +168,8 @@ class PagePlayer {
     // Probe and needle as hands move them.
     MouseTracker& hands() { return *hands_; }
     // A pose from elsewhere (a tracker, a test) instead of the hands', until the hands move again.
-    void put_tools(double now_s, const TrackerReading& reading);
+    // tracker: its word in the recording of an attempt that runs; empty: none.
+    void put_tools(double now_s, const TrackerReading& reading, const std::string& tracker = "");
 
     // Plays a sweep of the exercise from its beginning, as an expert is watched; hands do nothing
     // meanwhile. Ends with it, with end_watching() or with an attempt. Only without an attempt.

@@ -8,7 +8,9 @@
 
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
+#ifndef __EMSCRIPTEN__
 #include <dlfcn.h>
+#endif
 
 #include "formats/markers/marker_set.h"
 
@@ -26,6 +28,23 @@ struct Library {
     decltype(&apriltag_detections_destroy) detections_destroy = nullptr;
     bool complete = false;
 };
+
+#ifdef __EMSCRIPTEN__
+
+// A page's program has no libraries beside it: this one is linked in.
+const Library& library() {
+    static const Library linked = {tag36h11_create,
+                                   tag36h11_destroy,
+                                   apriltag_detector_create,
+                                   apriltag_detector_destroy,
+                                   apriltag_detector_add_family_bits,
+                                   apriltag_detector_detect,
+                                   apriltag_detections_destroy,
+                                   true};
+    return linked;
+}
+
+#else
 
 template <class Function>
 bool find(void* library, const char* name, Function& function) {
@@ -50,6 +69,8 @@ const Library& library() {
     }();
     return opened;
 }
+
+#endif
 
 }  // namespace
 

@@ -8,63 +8,10 @@
 
 #include "formats/files/atomic_file.h"
 #include "formats/files/jpeg_video.h"
-#include "formats/markers/detect/tag_detector.h"
-#include "formats/markers/pose_predictor.h"
+#include "formats/markers/detect/camera_poses.h"
 
 namespace sonocase::runtime::inline tracking_camera {
 namespace {
-
-constexpr const char* kNotCalibrated =
-    "This camera is not calibrated: it is taken to see 65 degrees across. Lengths may be off by a "
-    "fifth until sonocase calibrate camera has measured it.";
-
-// Why a picture without tags has none.
-Message what_is_wrong(const GreyImage& picture, TagDetector& detector) {
-    constexpr std::size_t kEvery = 97;  // pixels
-    double sum = 0, count = 0;
-    for (std::size_t i = 0; i < picture.pixels.size(); i += kEvery) {
-        sum += picture.pixels[i];
-        count += 1;
-    }
-    constexpr double kDark = 16;
-    if (sum < kDark * count)
-        return "The camera's picture is dark: switch a light on, or open its cover.";
-    const GreyPicture grey{picture.pixels.data(), picture.width_px, picture.height_px,
-                           picture.width_px};
-    if (detector.count_mirrored(grey) > 0)
-        return "The camera's picture is mirrored: switch mirroring off in the camera's settings.";
-    return "The camera sees no tag: place the printed bodies and the board in its view.";
-}
-
-// The same for a stream: after a second without tags, and twice a second from then on.
-class EmptyPictures {
-  public:
-    Message sentence(const GreyImage& picture, bool any_tags, TagDetector& detector, double now_s) {
-        if (any_tags || since_s_ < 0) {
-            since_s_ = now_s;
-            sentence_ = {};
-        } else if (now_s - since_s_ > 1 && now_s - judged_s_ > 0.5) {
-            judged_s_ = now_s;
-            sentence_ = what_is_wrong(picture, detector);
-        }
-        return sentence_;
-    }
-
-  private:
-    double since_s_ = -1, judged_s_ = -1;
-    Message sentence_;
-};
-
-Result<CameraModel> model_for(const CameraTrackerOptions& options, int width_px, int height_px) {
-    constexpr int kMinWidth = 480;
-    if (std::max(width_px, height_px) < kMinWidth) {
-        return Error{Message("The camera's pictures of {} x {} are too small: tags cannot be read.",
-                             {std::to_string(width_px), std::to_string(height_px)}),
-                     "", ""};
-    }
-    if (!options.calibrated) return assumed_camera(width_px, height_px);
-    return at_size(options.setup.camera, width_px, height_px);
-}
 
 SensorState state_of(MarkerStatus status) {
     return status == MarkerStatus::good   ? SensorState::ok
@@ -128,11 +75,10 @@ void CameraTracker::run() {
 }
 
 void CameraTracker::stream(PictureSource& source) {
-    Result<TagDetector> detector = TagDetector::create();
-    const Result<CameraModel> camera = model_for(options_, source.width_px(), source.height_px());
-    if (!detector || !camera) {
-        set_health(TrackerPhase::failed,
-                   !detector ? detector.error().message() : camera.error().message());
+    Result<CameraPoses> poses =
+        CameraPoses::create(options_, source.width_px(), source.height_px());
+    if (!poses) {
+        set_health(TrackerPhase::failed, poses.error().message());
         while (!stop_) pause(options_.retry_s);
         return;
     }
@@ -142,12 +88,6 @@ void CameraTracker::stream(PictureSource& source) {
         health_.phase = TrackerPhase::starting;
         ++health_.connects;
     }
-    PictureFollower follower(std::move(*detector),
-                             MarkerFollower(*camera, marker_bodies(options_.setup)));
-    std::vector<PosePredictor> predictors;
-    for (const MarkerRole role : {MarkerRole::probe, MarkerRole::needle})
-        predictors.emplace_back(follower.follower().body(role)->body_from_tool * Point3{});
-    EmptyPictures empty;
     GreyImage picture;
     double late_s = -1;
     double last_s = -1, period_s = 0;
@@ -171,8 +111,9 @@ void CameraTracker::stream(PictureSource& source) {
         }
         heard_s = now_s;
         const double time_s = now_s - age_s;
-        const FollowerPicture seen = follower.follow(
-            {picture.pixels.data(), picture.width_px, picture.height_px, picture.width_px}, time_s);
+        const FollowerPicture& seen = poses->follow(
+            {picture.pixels.data(), picture.width_px, picture.height_px, picture.width_px}, time_s,
+            now_s);
         TrackerReading reading;
         reading.sequence = ++sequence_;
         reading.time_s = clock_();
@@ -180,10 +121,11 @@ void CameraTracker::stream(PictureSource& source) {
         const double took_s = reading.time_s - time_s;
         late_s = late_s < 0 ? took_s : 0.9 * late_s + 0.1 * took_s;
         reading.sensor_count = 2;
+        constexpr MarkerRole kRoles[] = {MarkerRole::probe, MarkerRole::needle};
         for (int k = 0; k < 2; ++k) {
             SensorReading& sensor = reading.sensors[k];
             sensor.state = state_of(seen.tools[k].status);
-            sensor.world_from_sensor = predictors[k].follow(seen.tools[k], time_s, reading.time_s);
+            sensor.world_from_sensor = poses->pose_at(kRoles[k], reading.time_s);
             // 1 at a tenth of a millimetre, 0.5 at one.
             sensor.quality = seen.tools[k].sigma_mm < 0
                                  ? 0
@@ -194,14 +136,11 @@ void CameraTracker::stream(PictureSource& source) {
         if (last_s >= 0)
             period_s = period_s > 0 ? 0.9 * period_s + 0.1 * (now_s - last_s) : now_s - last_s;
         last_s = now_s;
-        Message message = empty.sentence(picture, follower.any_tags(), follower.detector(), now_s);
-        if (message.empty()) message = seen.problem;
-        if (message.empty() && !options_.calibrated) message = kNotCalibrated;
         std::function<void()> wake;
         {
             const std::lock_guard lock(mutex_);
             health_.phase = TrackerPhase::streaming;
-            health_.message = message;
+            health_.message = poses->message();
             health_.rate_hz = period_s > 0 ? 1 / period_s : 0;
             health_.late_s = late_s;
             ++health_.readings;
@@ -231,7 +170,7 @@ Result<Recording> load_camera_video(const std::string& path, const CameraTracker
         } else {
             if (!follower) {
                 SONOCASE_TRY(const CameraModel camera,
-                             model_for(options, picture.width_px, picture.height_px));
+                             camera_for(options, picture.width_px, picture.height_px));
                 SONOCASE_TRY(TagDetector detector, TagDetector::create());
                 follower.emplace(std::move(detector),
                                  MarkerFollower(camera, marker_bodies(options.setup)));
@@ -250,7 +189,9 @@ Result<Recording> load_camera_video(const std::string& path, const CameraTracker
             if (problem.empty()) problem = seen.problem;
             any_tags = any_tags || follower->any_tags();
             if (!any_tags && nothing_seen.empty())
-                nothing_seen = what_is_wrong(picture, follower->detector());
+                nothing_seen = why_no_tags(
+                    {picture.pixels.data(), picture.width_px, picture.height_px, picture.width_px},
+                    follower->detector());
         }
         recording.probe.push_back(probe);
         recording.needle.push_back(needle);

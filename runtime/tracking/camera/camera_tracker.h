@@ -17,7 +17,7 @@
 #include <thread>
 
 #include "formats/base/mailbox.h"
-#include "formats/markers/camera_model.h"
+#include "formats/markers/detect/camera_poses.h"
 #include "formats/markers/detect/grey_jpeg.h"
 #include "runtime/tracking/replay_tracker.h"
 #include "runtime/tracking/tracker.h"
@@ -41,11 +41,7 @@ class PictureSource {
 // camera that another program uses, are shown. Either way it is tried again.
 using OpenSource = std::function<Result<std::unique_ptr<PictureSource>>()>;
 
-// The camera of nothing is known: it is taken to see kAssumedViewDeg across, and the sheets to be
-// as drawn.
-struct CameraTrackerOptions {
-    CameraSetup setup;
-    bool calibrated = false;  // setup comes from a file
+struct CameraTrackerOptions : KnownCamera {
     double retry_s = 0.5;
 };
 

@@ -19,6 +19,9 @@ export const kDoppler = [
     'gate_depth_mm', 'gate_mm', 'angle_deg'];
 export const kDopplerModes = ['off', 'colour', 'power', 'spectral', 'm_mode'];
 
+// What put_tools() is told, in the order of exports.cpp.
+const kToolStates = ['absent', 'good', 'poor', 'lost'], kTrackers = ['', 'poses', 'camera'];
+
 export const kFrameStatus = ['rendered', 'held_bad_pose', 'no_contact'];
 
 // The smallest module that uses a 128-bit instruction: (func (result v128) i32.const 0 i8x16.splat ...).
@@ -139,12 +142,18 @@ export class Core {
         const side = this.values().side;
         return new Uint32Array(this.memory.buffer, this.calls.screen(), side * side);
     }
-    // probe, needle: 16 numbers, rows of mannequin_from_...; needle may be null.
-    put_tools(now_s, probe, needle) {
+    // probe, needle: 16 numbers, rows of mannequin_from_...; needle may be null. states: of both, by kToolStates. tracker:
+    // of kTrackers, as a recording names it.
+    put_tools(now_s, probe, needle, states = ['good', needle ? 'good' : 'absent'], tracker = '') {
         const at = this.calls.poses(), to = new Float64Array(this.memory.buffer, at, 32);
         to.set(probe);
         if (needle) to.set(needle, 16);
-        this.calls.put_tools(now_s, needle ? 1 : 0);
+        this.calls.put_tools(now_s, ...states.map((state) => kToolStates.indexOf(state)), kTrackers.indexOf(tracker));
+    }
+    // Hands the probe back to the start; rows of mannequin_from_probe there.
+    probe_home() {
+        this.calls.probe_home();
+        return new Float64Array(this.memory.buffer, this.calls.hands_pose(), 16).slice();
     }
     // seed: that targets and start are drawn with; 0: as written.
     start_attempt(trainee, started, now_s, seed = 0) {

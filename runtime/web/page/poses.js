@@ -17,7 +17,7 @@ export function parse_poses(text) {
     }
     const good = (rows) => Array.isArray(rows) && rows.length === 16 && rows.every((x) => Number.isFinite(x));
     if (!good(message?.probe) || !(message.needle === null || good(message.needle))) return null;
-    return {probe: message.probe, needle: message.needle};
+    return {probe: message.probe, needle: message.needle, tracker: 'poses'};
 }
 
 export class PoseSource {

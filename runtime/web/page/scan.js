@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The scanning page: picture, console, cine and attempts.
+import {PlainError} from './core.js';
 import {Doppler} from './doppler.js';
 import {Hands} from './hands.js';
 import {Picture} from './picture.js';
 import {minutes} from './results.js';
+import {inside_page} from './source.js';
 import {View3d} from './view3d.js';
 import {exercise_texts, label_words, t} from './words.js';
 
 const kIdleRate = 40;  // pictures per second while nothing moves: tissue breathes, noise changes
 const kSliders = 8;
+const kCamera = true;  // scripts/web-pack.mjs: false where it was built without
 const $ = (id) => document.getElementById(id);
 const kAnswer = 9;  // of the kinds of acts
 const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
@@ -72,6 +75,7 @@ export class ScanPage {
         click('next-hint', () => this.next_hint());
         click('skip-guide', () => this.skip_guide());
         $('mode').addEventListener('change', () => this.touched());
+        click('camera', () => this.toggle_camera());
         click('level', () => this.level());
         click('flip', () => this.flip());
         click('measure', () => this.measure(!this.measuring));
@@ -204,9 +208,9 @@ export class ScanPage {
     touched() { this.moved = true; }
     // A tracker's newest pose moves the tools; hands move them again from there on.
     take_pose(now_s) {
-        const poses = this.poses?.take();
+        const poses = (this.camera ?? this.poses)?.take();
         if (!poses) return;
-        this.core.put_tools(now_s, poses.probe, poses.needle);
+        this.core.put_tools(now_s, poses.probe, poses.needle, poses.states, poses.tracker);
         this.moved = true;
     }
     tracker_says(words) {
@@ -436,6 +440,37 @@ export class ScanPage {
     push_to(mm) {
         this.core.calls.advance_needle(mm - this.values.needle_depth_mm);
         this.touched();
+    }
+    // Its part of the page, its worker and its program are fetched here, and the user is asked.
+    async toggle_camera() {
+        const show = (camera) => {
+            this.camera = camera;
+            $('camera').setAttribute('aria-pressed', String(camera !== null));
+            $('camera-room').hidden = camera === null;
+        };
+        if (this.camera) {
+            this.camera.stop();
+            show(null);
+            return;
+        }
+        this.notice('');
+        try {
+            if (!kCamera) throw new PlainError(t('This page was built without the camera.'));
+            if (inside_page('program')) throw new PlainError(t('A page in one file cannot use the camera: open the site instead.'));
+            const {CameraTracker} = await import('./camera.js').catch(() => {
+                throw new PlainError(t('The program of the camera did not load. Check the network, then press Camera again.'));
+            });
+            if (this.camera) return;  // pressed twice
+            const ended = (words) => { show(null); this.notice(words); };
+            const camera = new CameraTracker(this, $('camera-room'), ended);
+            show(camera);
+            await camera.start();
+        } catch (error) {
+            this.camera?.stop();
+            show(null);
+            if (!(error instanceof PlainError)) throw error;
+            this.notice(error.message);
+        }
     }
     async device_tilt(box) {
         if (box.checked && !await this.hands.use_tilt(true)) {

@@ -339,6 +339,13 @@ SONOCASE_EXPORT(press) void press(double mm) {
 SONOCASE_EXPORT(probe_home) void probe_home() {
     page.player->hands().reset();
 }
+// mannequin_from_probe of the hands, 16 numbers row by row.
+SONOCASE_EXPORT(hands_pose) const double* hands_pose() {
+    const std::array<double, 16> rows =
+        matrix_from_rigid(page.player->hands().mannequin_from_probe());
+    std::copy(rows.begin(), rows.end(), page.poses.begin());
+    return page.poses.data();
+}
 SONOCASE_EXPORT(take_needle) int take_needle(int in_plane) {
     return page.player->hands().take_needle(page.player->exercise().probe, in_plane != 0);
 }
@@ -366,16 +373,20 @@ SONOCASE_EXPORT(slide_needle) void slide_needle(double x_mm, double y_mm) {
 SONOCASE_EXPORT(poses) double* poses() {
     return page.poses.data();
 }
-SONOCASE_EXPORT(put_tools) void put_tools(double now_s, int has_needle) {
+// States: SensorState, in the order of kToolStates of page/core.js. tracker: of kTrackers there.
+SONOCASE_EXPORT(put_tools)
+void put_tools(double now_s, int probe_state, int needle_state, int tracker) {
+    constexpr const char* kTrackers[] = {"", "poses", "camera"};
     TrackerReading reading;
     reading.time_s = now_s;
     reading.in_mannequin = true;
     reading.sensor_count = 2;
-    reading.sensors[kProbeSensor] = {SensorState::ok, rigid_at(page.poses.data()), 1.0f, 0};
-    if (has_needle)
-        reading.sensors[kNeedleSensor] = {SensorState::ok, rigid_at(page.poses.data() + 16), 1.0f,
-                                          0};
-    page.player->put_tools(now_s, reading);
+    const int states[] = {probe_state, needle_state};
+    for (const int tool : {kProbeSensor, kNeedleSensor})
+        if (states[tool] != 0)
+            reading.sensors[tool] = {static_cast<SensorState>(states[tool]),
+                                     rigid_at(page.poses.data() + 16 * tool), 1.0f, 0};
+    page.player->put_tools(now_s, reading, kTrackers[tracker]);
 }
 
 // text(): trainee, a line break, start as ISO 8601. seed: that targets and start are drawn with.

@@ -19,8 +19,7 @@
 #include <dlfcn.h>
 
 #include "formats/base/constants.h"
-#include "formats/markers/detect/tag_detector.h"
-#include "formats/markers/pose_predictor.h"
+#include "formats/markers/detect/camera_poses.h"
 #include "support/marker_jpeg.h"
 #include "support/marker_video.h"
 
@@ -294,6 +293,29 @@ TEST_F(MarkerPose, ACameraThatHangsUpsideDownSeesTheSame) {
     ASSERT_EQ(reading.status, MarkerStatus::good);
     const Point3 tool = bodies_[0].body_from_tool * Point3{};
     EXPECT_LT(distance(reading.world_from_body * tool, inverse(board) * probe * tool), 1.5);
+}
+
+TEST_F(MarkerPose, TimesThatComeInClumpsDoNotThrowTheSearchOff) {
+    const Rigid table = camera_from_table(600, 60 * kRadPerDeg);
+    const Rigid board{table.rotation, table * Point3{-110, 90, 0} - Point3{}};
+    const auto probe = [&](double t) { return table * Rigid{{}, {-60 + 120 * t, -60, 150}}; };
+    PictureFollower follower(std::move(*detector_), MarkerFollower(camera_, bodies_));
+    const double said_s[] = {0, 0.033, 0.036, 0.1};
+    for (int i = 0; i < 4; ++i) {
+        const double t = i / 30.0;
+        const FollowerPicture seen = follower.follow(
+            picture_of({still_body(bodies_[2], board), {&bodies_[0], probe}}, t), said_s[i]);
+        EXPECT_EQ(seen.tools[0].status, MarkerStatus::good) << i;
+    }
+}
+
+TEST(CameraPoses, AnUnknownCameraSeesTheSameHeldUpright) {
+    const auto lying = camera_for({}, 1280, 720), upright = camera_for({}, 720, 1280);
+    ASSERT_TRUE(lying);
+    ASSERT_TRUE(upright);
+    EXPECT_NEAR(upright->fx_px, lying->fx_px, 1e-9);
+    EXPECT_NEAR(upright->fy_px, lying->fy_px, 1e-9);
+    EXPECT_FALSE(camera_for({}, 160, 120));
 }
 
 TEST_F(MarkerPose, APictureOfTheSheetOnAScreenIsNoTool) {

@@ -52,6 +52,7 @@ TEST_F(Publish, a_site_holds_page_program_and_the_cases_bytes) {
     ASSERT_TRUE(published) << published.error().message();
     for (const std::string& file : published->files) EXPECT_TRUE(fs::is_regular_file(file)) << file;
     EXPECT_EQ(text_of(site("/sonoplay.wasm")), "sonoplay.wasm");
+    EXPECT_FALSE(fs::exists(site("/camera.js"))) << "this page was built without its camera";
     // The same chunks, in the order in which a page loads them.
     const std::vector<std::uint8_t> sent = *arranged_for_loading(bytes_, false, "round body");
     const std::string digest = digest_of(sent);
@@ -95,6 +96,14 @@ TEST_F(Publish, a_record_store_is_allowed_by_the_policy_and_no_other_host) {
         options_.xapi = wrong;
         EXPECT_FALSE(publish({case_path("round body")}, site("-wrong"), options_)) << wrong;
     }
+}
+
+TEST_F(Publish, a_page_that_was_built_with_its_camera_brings_it) {
+    for (const std::string name : {"camera.js", "camera_worker.js", "camera.wasm"})
+        ASSERT_TRUE(write_file(folder_.path() + "/program/" + name, std::string_view(name)));
+    ASSERT_TRUE(publish({case_path("round body")}, site(), options_));
+    for (const std::string name : {"camera.js", "camera_worker.js", "camera.wasm"})
+        EXPECT_EQ(text_of(site("/" + name)), name);
 }
 
 TEST_F(Publish, a_key_of_the_record_store_is_given_to_the_page) {

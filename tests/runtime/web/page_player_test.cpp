@@ -93,6 +93,30 @@ TEST(PagePlayer, an_attempt_is_scored_as_its_recording_is) {
 
 // Acts, steps and the list are those of the core: what the page says while it runs is what its
 // recording is scored as.
+TEST(PagePlayer, a_recording_names_the_tracker_that_moved_the_tools) {
+    const auto player = open_small();
+    for (const std::string tracker : {"", "camera"}) {
+        ASSERT_TRUE(player->start_attempt("", "2026-01-31T12:00:00Z", 0));
+        TrackerReading reading;
+        reading.in_mannequin = true;
+        reading.sensor_count = 2;
+        for (int n = 0; n < 3; ++n) {
+            reading.time_s = 0.05 * n;
+            reading.sensors[kProbeSensor] = {SensorState::ok,
+                                             player->hands().mannequin_from_probe()};
+            player->put_tools(reading.time_s, reading, tracker);
+            player->frame(reading.time_s, {});
+        }
+        const auto finished = player->finish_attempt();
+        ASSERT_TRUE(finished);
+        const auto sequence = read_sequence(finished->recording, "");
+        ASSERT_TRUE(sequence);
+        const auto session = session_from_sequence(*sequence, guess_names(*sequence), "");
+        ASSERT_TRUE(session);
+        EXPECT_EQ(detail_value(session->header.attempt, "tracker"), tracker);
+    }
+}
+
 TEST(PagePlayer, a_procedure_is_done_asked_and_ticked) {
     CaseBundle bundle = testing::small_case();
     bundle.exercises[0].toml += R"(
