@@ -256,7 +256,7 @@ void add_tissues(const CaseBundle& bundle,
     if (options.acts) add_act_tissues(s);
     add_free_fluid(options.free_fluid, s);
     for (AcousticProperties& a : s.acoustics) {
-        if (a.kind == TissueKind::fluid) a.attenuation += kFluidSteepening;
+        if (a.kind == TissueKind::fluid) a.attenuation += fluid_steepening(a.attenuation);
     }
     s.pairs.resize(count * count);
     for (std::size_t a = 0; a < count; ++a) {
