@@ -11,8 +11,11 @@
 namespace sonocase {
 namespace {
 
-// Fluid takes the harmonics of a steep pulse, dB/cm/MHz (docs/effects.md).
-constexpr double kFluidLoss = 0.22;
+// Fluid takes the harmonics of a steep pulse, dB/cm/MHz: the less, the more it absorbs itself
+// (docs/effects.md, attenuation).
+double fluid_loss(double attenuation_db_cm_mhz) {
+    return 0.22 * std::max(1 - attenuation_db_cm_mhz / 0.2, 0.0);
+}
 
 }  // namespace
 
@@ -28,7 +31,8 @@ CaseAnatomy::CaseAnatomy(CaseView bundle, const BreathingMotion& breathing)
         acoustics_[i] = {tissue.attenuation_db_cm_mhz,
                          exponential(0.11512925464970229 * tissue.echo_db),
                          tissue.kind == TissueKind::bone, tissue.kind == TissueKind::gas};
-        if (tissue.kind == TissueKind::fluid) acoustics_[i].loss_db_cm_mhz += kFluidLoss;
+        if (tissue.kind == TissueKind::fluid)
+            acoustics_[i].loss_db_cm_mhz += fluid_loss(tissue.attenuation_db_cm_mhz);
     }
 }
 

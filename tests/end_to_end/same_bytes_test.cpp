@@ -32,9 +32,9 @@ constexpr const char* kDraft = "9c7a43374a733d41638b6e841fc95b66";
 constexpr const char* kBalanced = "01c85bbd40b1df379ed3d71d6bf31dfb";
 constexpr const char* kSlender = "08e665aa2bf6f95bef4295beeee8131d";
 constexpr const char* kReal = "1d753d2be3b305eb98cfea61f3be90e4";
-constexpr const char* kDraftPhysical = "92c2c98940ad9cc88398e01efd9e8b5f";
+constexpr const char* kDraftPhysical = "2b2c53014163238afd94862e3bbcd6d3";
 constexpr const char* kDraftPaper = "1aaccd9bf66881ec2231c9c0ceb219e6";
-constexpr const char* kRealPhysical = "b245683e2412597e683dbc7901cae19e";
+constexpr const char* kRealPhysical = "c97f3a47f7305c8c904e1f49262586ac";
 constexpr const char* kRealPaper = "238bbc50256594eac66fdcb76d826e84";
 
 class SameBytes : public ::testing::Test {

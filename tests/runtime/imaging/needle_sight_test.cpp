@@ -123,7 +123,7 @@ TEST(NeedleSight, SaysWhatFramesShow) {
     thin.needle.slab_mm = 0.9;
     compare_with_frames(phantom(), thin, shafts, tips);
     compare_with_frames(phantom(), sonocase::testing::phantom_linear_exercise(), shafts, tips);
-    EXPECT_LT(shafts.seen, 0.8 * shafts.points);  // ribs, gas, air and angles hide some of it
+    EXPECT_LT(shafts.seen, 0.85 * shafts.points);  // ribs, gas, air and angles hide some of it
     EXPECT_GT(shafts.clear, 400);
     EXPECT_GT(tips.clear, 60);
     shafts.report("shafts");

@@ -4,6 +4,7 @@
 // dB/cm/MHz, amplitudes relative to a homogeneous liver. docs/effects.md names the source of each.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 namespace sonocase::runtime::physical {
@@ -60,8 +61,12 @@ inline constexpr double kGasTail = 1.4, kGasTailMm = 18;
 // the depth (A-lines), each kReverbLoss of the one before; half a line is kReverbWidth pulses wide.
 inline constexpr double kReverb = 2.5, kReverbLoss = 0.42, kReverbWidth = 3;
 // In fluid the pulse steepens and its harmonics are lost: attenuation in addition to the fluid's
-// own, dB/cm/MHz. Without it, everything behind a full bladder would be white.
-inline constexpr double kFluidSteepening = 0.22;
+// own, dB/cm/MHz. Without it, everything behind a full bladder would be white. A fluid that itself
+// absorbs, such as blood, lets the pulse steepen less.
+inline constexpr double kFluidSteepening = 0.22, kNoSteepeningFrom = 0.2;
+inline double fluid_steepening(double attenuation_db_cm_mhz) {
+    return kFluidSteepening * std::max(1 - attenuation_db_cm_mhz / kNoSteepeningFrom, 0.0);
+}
 
 // Haze: side lobes, relative to the mean envelope nearby.
 inline constexpr int kHazeCell = 8;   // samples and beams of a cell of the mean

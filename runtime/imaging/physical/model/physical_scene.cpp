@@ -254,7 +254,7 @@ void add_tissues(const CaseBundle& bundle,
     if (s.has_acts)
         for (const FreeFluid& fluid : options.free_fluids) add_free_fluid(fluid, s);
     for (AcousticProperties& a : s.acoustics) {
-        if (a.kind == TissueKind::fluid) a.attenuation += kFluidSteepening;
+        if (a.kind == TissueKind::fluid) a.attenuation += fluid_steepening(a.attenuation);
     }
     s.pairs.resize(count * count);
     for (std::size_t a = 0; a < count; ++a) {
