@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "formats/base/constants.h"
 #include "pipeline/import/body/body_field.h"
 
 namespace sonocase::pipeline::inline import_body {
@@ -415,7 +416,7 @@ void fill_bladder(BodyField& body, const BodyOptions& options) {
     const LabelSet bones = body.with({"hip", "pelvis", "ilium", "pubis", "ischium", "sacrum"});
     // An ellipsoid about its middle, which rises out of the pelvis as it is filled.
     const Box3 box = body.box_of(bladder);
-    const double r = std::cbrt(3000 * options.bladder_ml / (4 * 3.14159265));
+    const double r = std::cbrt(3000 * options.bladder_ml / (4 * kPi));
     const Point3 middle = box.centre() + Vector3{0, 0.1 * r, 0.5 * r};
     std::vector<std::pair<double, std::size_t>> order;
     const Grid& grid = body.grid();
