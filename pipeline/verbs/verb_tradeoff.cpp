@@ -76,6 +76,8 @@ std::vector<NamedSuite> suites() {
         {"region", region_suite},
         {"pathology", pathology_suite},
         {"cost", cost_suite},
+        {"make", make_suite},
+        {"publish", publish_suite},
         {"case", [] { return case_suite({}, kTimedBody); }},
         {"case", [] { return case_suite(*analytic_body("slender"), "slender"); }},
     };
