@@ -98,7 +98,7 @@ ProcedureRun::ProcedureRun(const Exercise& exercise,
         FreeFluidPlace place(
             free, [&](Point3 at) { return anatomy_->label(at); }, labels);
         full_ml_.push_back(std::min(free.ml, place.capacity_ml()));
-        fluids_.push_back({std::move(place)});
+        fluids_.push_back({std::move(place), {}});
         Target fluid;
         fluid.name = free.name;
         fluid.centre = free.centre;

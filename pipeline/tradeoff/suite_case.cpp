@@ -23,6 +23,8 @@ Settings settings_of(const Preset& preset) {
     return settings;
 }
 
+}  // namespace
+
 std::vector<NamedSettings> preset_points(const StageTable& table) {
     std::vector<NamedSettings> named;
     for (const Preset& preset : table.presets)
@@ -30,8 +32,6 @@ std::vector<NamedSettings> preset_points(const StageTable& table) {
                          "coarse voxels and textures show in the picture, not in this mean"});
     return named;
 }
-
-}  // namespace
 
 Suite case_suite(const AnalyticBody& body, const std::string& body_name) {
     Suite suite;

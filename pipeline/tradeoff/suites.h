@@ -52,6 +52,9 @@ Suite camera_suite();
 Suite fluid_suite();
 // The cost that a build predicts against the time it takes, measured by commands.
 Suite cost_suite();
+// `sonocase make` on a segmentation of the demo torso; and what a page waits for of such a case.
+Suite make_suite();
+Suite publish_suite();
 // The whole chain on the demo torso, or another body of the same family.
 Suite case_suite(const AnalyticBody& body, const std::string& body_name);
 // The whole chain on a user's case, against its own finest setting.
@@ -60,6 +63,9 @@ Suite own_case_suite(const Recipe& recipe);
 // Sets the options of the stages by the names that a recipe uses for them. Error: an
 // option or a value that the stages do not know.
 Status apply_settings(const Settings& settings, StageSettings& options);
+
+// The presets of the table as settings.
+std::vector<NamedSettings> preset_points(const StageTable& table);
 
 // The knobs of one suite: every option of the table that is swept in it, with its default.
 std::vector<Knob> knobs_of(const StageTable& table, const std::string& suite);

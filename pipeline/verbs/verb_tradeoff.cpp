@@ -77,6 +77,8 @@ std::vector<NamedSuite> suites() {
         {"pathology", pathology_suite},
         {"fluid", fluid_suite},
         {"cost", cost_suite},
+        {"make", make_suite},
+        {"publish", publish_suite},
         {"case", [] { return case_suite({}, kTimedBody); }},
         {"case", [] { return case_suite(*analytic_body("slender"), "slender"); }},
     };

@@ -25,7 +25,7 @@ def test_pip_installs_a_package_that_renders(small, tmp_path):
                "--target", tmp_path / "site")
     assert done.returncode == 0, done.stderr
     names = {path.name for path in (tmp_path / "site" / "sonocase").iterdir()}
-    assert {"__init__.py", "__init__.pyi", "py.typed", "data.py", "domain.py", "environment.py", "pose.py"} <= names
+    assert {"__init__.py", "__init__.pyi", "py.typed", "data.py", "domain.py", "environment.py", "pose.py", "pose.pyi"} <= names
     program = f"""
 import sonocase, numpy
 assert sonocase.__file__.startswith({str(tmp_path)!r}), sonocase.__file__
