@@ -334,10 +334,14 @@ void PictureFollower::note_twice() {
 
 FollowerPicture PictureFollower::follow(const GreyPicture& picture, double time_s) {
     constexpr MarkerRole kTools[] = {MarkerRole::probe, MarkerRole::needle};
-    constexpr int kSearchEvery = 4;  // pictures, while everything is in view
-    constexpr int kEnoughTags = 2;   // of a body
-    constexpr int kOverlap = 40;     // pixels: by which parts overlap
+    constexpr int kSearchEvery = 4;   // pictures, while everything is in view
+    constexpr int kEnoughTags = 2;    // of a body
+    constexpr int kOverlap = 40;      // pixels: by which parts overlap
+    constexpr double kPauseS = 0.15;  // where a tool is by then is not known
     ++picture_;
+    const bool begins = time_s - last_s_ > kPauseS;
+    last_s_ = time_s;
+    if (begins) places_ = {};
     raw_.clear(), fitted_.clear(), twice_.clear();
     look_at_board(picture);
     bool missing = follower_.body(MarkerRole::board) && !seen(MarkerRole::board, 3);
@@ -349,8 +353,9 @@ FollowerPicture PictureFollower::follow(const GreyPicture& picture, double time_
         missed[t] = !seen(kTools[t], kEnoughTags);
         missing = missing || missed[t];
     }
-    if (picture_ == 1) {
+    if (begins) {
         detector_.read(picture, whole(picture), kFindStep, raw_);
+        foreign_ = {};
         for (const SeenTag& tag : raw_)
             foreign_[0] += find_tag(follower_.bodies(), tag.id).body < 0;
     } else if (missing || picture_ % kSearchEvery == 0) {

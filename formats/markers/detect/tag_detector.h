@@ -56,13 +56,13 @@ class TagDetector {
 
 // Bodies and board through a stream of pictures. What was seen in the last picture is looked for
 // where it should be now; for what was not, a third of the picture is searched, then the next, so
-// that it is found within three pictures. The thirds are searched now and then anyhow, for a second
-// sheet or a wrong one.
+// that it is found within three pictures; after a pause, as at the beginning, the whole. The thirds
+// are searched now and then anyhow, for a second sheet or a wrong one.
 class PictureFollower {
   public:
     PictureFollower(TagDetector detector, MarkerFollower follower);
     // time_s: of the middle of the exposure, rising. Cost: 6 to 11 ms for 1280 x 720 (benchmark
-    // Camera), and up to 30 for the first picture.
+    // Camera), and up to 30 for the first one and after a pause.
     FollowerPicture follow(const GreyPicture& picture, double time_s);
     // Whether any tag at all was read in the last picture.
     bool any_tags() const { return any_tags_; }
@@ -88,6 +88,7 @@ class PictureFollower {
     std::array<std::int64_t, kMarkerTagIds> twice_until_;
     static constexpr int kParts = 3;
     std::int64_t picture_ = 0;
+    double last_s_ = -1e9;
     int part_ = 0;
     std::array<int, kParts> foreign_{};  // in each part, when it was last searched
     bool any_tags_ = false;

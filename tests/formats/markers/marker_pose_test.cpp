@@ -309,6 +309,21 @@ TEST_F(MarkerPose, TimesThatComeInClumpsDoNotThrowTheSearchOff) {
     }
 }
 
+TEST_F(MarkerPose, AfterAPauseEverythingIsFoundInTheNextPicture) {
+    const Rigid table = camera_from_table(600, 60 * kRadPerDeg);
+    const Rigid board{table.rotation, table * Point3{-110, 90, 0} - Point3{}};
+    PictureFollower follower(std::move(*detector_), MarkerFollower(camera_, bodies_));
+    // A busy browser gives none for a while; farther than a hand comes between two pictures.
+    for (const auto& [time_s, x] : {std::pair{0.0, -100.0}, {0.033, -100.0}, {0.3, 60.0}}) {
+        const Rigid probe = table * Rigid{{}, {x, -60, 150}};
+        const FollowerPicture seen = follower.follow(
+            picture_of({still_body(bodies_[2], board), still_body(bodies_[0], probe)}, time_s),
+            time_s);
+        EXPECT_EQ(seen.tools[0].status, MarkerStatus::good) << time_s;
+        EXPECT_TRUE(seen.problem.empty()) << seen.problem;
+    }
+}
+
 TEST(CameraPoses, AnUnknownCameraSeesTheSameHeldUpright) {
     const auto lying = camera_for({}, 1280, 720), upright = camera_for({}, 720, 1280);
     ASSERT_TRUE(lying);
