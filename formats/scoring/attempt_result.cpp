@@ -76,7 +76,7 @@ AttemptResult attempt_result(const SessionScore& score) {
         result.rows.push_back(row_of(mark));
         result.marks_reached += mark.passed;
     }
-    // A mark that was missed is never among those that do not fit.
+    // What was missed most comes first.
     std::stable_sort(result.rows.begin(), result.rows.end(),
                      [](const ResultRow& a, const ResultRow& b) { return miss(a) > miss(b); });
     if (!result.rows.empty()) {
@@ -96,7 +96,6 @@ AttemptResult attempt_result(const SessionScore& score) {
         row.value = metric.value;
         result.rows.push_back(row);
     }
-    if (result.rows.size() > kMaxResults) result.rows.resize(kMaxResults);
     for (ResultRow& row : result.rows) {
         const MetricInfo* info = find_metric(row.metric);
         row.title = info ? info->title : "";

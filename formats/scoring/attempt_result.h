@@ -31,8 +31,9 @@ struct AttemptResult {
     bool has_marks = false;
     bool passed = false;
     int marks = 0, marks_reached = 0;
-    std::vector<ResultRow> rows;  // at most kMaxResults; marks first, missed ones before others
-    const char* advice = "";      // a sentence for the worst miss; empty: none
+    // All marks, missed ones before others, then other metrics up to kMaxResults rows.
+    std::vector<ResultRow> rows;
+    const char* advice = "";  // a sentence for the worst miss; empty: none
     // Of the first row, whose trend over attempts is worth a look; empty: there are no marks.
     std::string trend_metric;
     std::vector<double> trend;  // of that metric, oldest first, this attempt last; finite

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// The page after an attempt: passed or not, in words; five results with what was needed; what to do
+// The page after an attempt: passed or not, in words; each mark with what was needed; what to do
 // differently; the trend; and from there, again, replay, review.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -333,9 +334,13 @@ void draw_results(Ui& ui,
     }
     if (training.score->procedure)
         draw_checklist(ui, room, inside, session, *training.score->procedure, requests);
+    // Six rows and what follows them fit the smallest window without scrolling.
+    const float left = inside.h - (room.y - top) - 45;
+    const float high = std::clamp(
+        left / static_cast<float>(std::max<std::size_t>(result.rows.size(), 1)), 66.0f, 76.0f);
     for (const ResultRow& row : result.rows) {
         ui.line(room.x, room.y, room.right(), room.y, colour::kLine);
-        draw_result(ui, room.take_top(76), row);
+        draw_result(ui, room.take_top(high), row);
     }
     ui.line(room.x, room.y, room.right(), room.y, colour::kLine);
     ButtonStyle style;

@@ -161,9 +161,11 @@ void draw_step_list(Ui& ui, const Box& card, SetupGuide& guide) {
                     now ? colour::kAccent : colour::kDim, Align::centre);
         }
         const Box words{row.x + 42, row.y, row.w - 46, row.h};
-        ui.text({words.x, y - 20, words.w, 20}, tr(setup_title(step)),
-                now ? Type::bold : Type::body, now ? colour::kText : colour::kDim, Align::left,
-                true);
+        const std::string title = tr(setup_title(step));
+        Type type = now ? Type::bold : Type::body;
+        if (ui.width(title, type) > words.w) type = Type::small;
+        ui.text({words.x, y - 20, words.w, 20}, title, type, now ? colour::kText : colour::kDim,
+                Align::left, true);
         ui.text({words.x, y, words.w, 18}, step_words(guide, step), Type::small, colour::kDim,
                 Align::left, true);
         ui.end_in_control();

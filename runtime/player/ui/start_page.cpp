@@ -116,8 +116,9 @@ float draw_case(const Progress& progress,
     }
     const std::string title = card && !card->title.empty() ? card->title : entry.name;
     ui.text(room.take_top(26), title, Type::heading, colour::kText, Align::left, true);
-    const std::string line =
-        filled(tr("%s · %.1f MB · exercises: %zu"), entry.name.c_str(), entry.megabytes, rows);
+    const std::string line = card ? filled(tr("%s · %.1f MB · exercises: %zu"), entry.name.c_str(),
+                                           entry.megabytes, rows)
+                                  : filled(tr("%s · %.1f MB"), entry.name.c_str(), entry.megabytes);
     ui.text(room.take_top(22), line, Type::small, colour::kDim, Align::left, true);
     for (std::size_t i = 0; i < rows; ++i) {
         const CaseCard::Exercise& exercise = card->exercises[i];
