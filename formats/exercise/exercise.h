@@ -140,9 +140,9 @@ struct Deformation {
     double vein_level_mm = 0, vein_swell_mm = 0;
 };
 
-// Free fluid in a space of the abdomen, where it lies lowest. It takes the place of one tissue, that
-// between the organs, within an ellipsoid and below a level; volume and posture say where the level
-// is (formats/scoring/free_fluid.h). Organs and bowel stay where they are.
+// Free fluid in a space of the abdomen, where it lies lowest. It takes the place of one tissue,
+// that between the organs, within an ellipsoid and below a level that volume and posture give
+// (formats/scoring/free_fluid.h). Organs and bowel stay where they are.
 struct FreeFluid {
     std::string name = "free_fluid";  // in conditions and questions
     double ml = 0;                    // 0: none

@@ -37,8 +37,8 @@ PhysicalEffects shown_by(PhysicalEffects on, const MachineStructures& machine) {
 }
 
 // A guide wire is coiled, and sends some echo back at every angle; a catheter's walls are smooth
-// plastic, drawn as thick as the samples lie apart. Diameters are those of a usual central line; the
-// rest is assumed.
+// plastic, drawn as thick as the samples lie apart. Diameters are those of a usual central line;
+// the rest is assumed.
 constexpr NeedleMake kWire{"wire", "", 0.9, 0.12, 0.2, 0.12, 0.12, true, 0, 0, 0, 0};
 constexpr NeedleMake kCatheterWall{"catheter", "", 0.6, 0.15, 0.2, 0.15, 0.15, false, 0, 0, 0, 0};
 NeedleShape shape_of(const NeedleMake& make, double echo, double tail) {

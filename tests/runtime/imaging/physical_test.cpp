@@ -126,9 +126,9 @@ TEST(PhysicalModel, WhatActsPutIntoTheTissueAgreesWithTheSlowRenderer) {
 }
 
 // The planes below a pool move by the volume injected, as measured in the picture alone. The fast
-// renderer finds the sheets of the wall on straight lines between nodes that lie up to 2.5 mm apart,
-// and beside the pool tissue is bent more than they follow: without the wall both agree to 0.04
-// grey, with it to the limits below.
+// renderer finds the sheets of the wall on straight lines between nodes that lie up to 2.5 mm
+// apart, and beside the pool tissue is bent more than they follow: without the wall both agree to
+// 0.04 grey, with it to the limits below.
 TEST(PhysicalModel, PoolsPushPlanesAsideByWhatWasInjected) {
     Exercise exercise = phantom_exercise();
     exercise.procedure.items.emplace_back();
