@@ -28,7 +28,8 @@ Message why_no_tags(const GreyPicture& picture, TagDetector& detector) {
     constexpr int kEvery = 97;  // pixels
     double sum = 0, count = 0;
     for (std::int64_t i = 0; i < std::int64_t{picture.width_px} * picture.height_px; i += kEvery) {
-        sum += picture.pixels[i / picture.width_px * picture.stride + i % picture.width_px];
+        const std::int64_t row = i / picture.width_px, column = i % picture.width_px;
+        sum += picture.pixels[row * picture.stride + column];
         count += 1;
     }
     constexpr double kDark = 16;
