@@ -288,7 +288,7 @@ TEST(PhantomPhysics, BehindFluidTissueIsBrighterButNotWhite) {
 CaseBundle liver_with_rod(std::uint8_t label, double diameter_mm) {
     return block_of(1, [&](Point3 p) -> std::uint8_t {
         if (p.z < 0) return Phantom::outside;
-        return std::hypot(p.x, p.z - 52) < 0.5 * diameter_mm ? label : Phantom::liver;
+        return std::hypot(p.x, p.z - 52) < 0.5 * diameter_mm ? label : std::uint8_t{Phantom::liver};
     });
 }
 
