@@ -147,7 +147,7 @@ struct PhysicalRig {
         frame.row_gain_db = gain;
         frame.effects = effects;
         frame.motion = motion;
-        if (needle) frame.needle = &shaft;
+        if (needle) frame.needles = {&shaft, 1};
         fast.render(frame, breathing, false, false, pixels);
     }
 
