@@ -81,10 +81,10 @@ std::optional<Rigid> MarkerFollower::expected(MarkerRole role, double time_s) co
     if (!track.seen || track.time_s < last_s_ || time_s - track.time_s > kTrustS) return {};
     Rigid pose = track.camera_from_body;
     // Times of a browser's camera come in clumps: two a few milliseconds apart tell no speed.
-    constexpr double kMostPeriods = 3;
+    constexpr double kMaxPeriods = 3;
     if (track.age_s > 0)
         pose.translation =
-            pose.translation + std::min((time_s - track.time_s) / track.age_s, kMostPeriods) *
+            pose.translation + std::min((time_s - track.time_s) / track.age_s, kMaxPeriods) *
                                    (pose.translation - track.before.translation);
     return pose;
 }

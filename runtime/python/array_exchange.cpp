@@ -470,8 +470,9 @@ void append(py::handle value, const char* name, int depth, Numbers& to) {
         if (!readable(view->kind(), view->item_bytes()))
             throw py::type_error(std::string(name) + ": an array of " +
                                  (view->kind() == NumberKind::truth_value ? "truth values"
-                                  : view->kind() == NumberKind::complex   ? "complex numbers"
-                                                                          : "what is no number") +
+                                  : view->kind() == NumberKind::complex
+                                      ? "complex numbers"
+                                      : "values that are not numbers") +
                                  "; give real numbers");
         const std::vector<double> values = view->values();
         to.values.insert(to.values.end(), values.begin(), values.end());

@@ -92,7 +92,7 @@ class _Choice:
             if value is None:
                 raise ValueError(f"{key}: null is no value: leave the key out")
             if limits is not None and not _is_number(value):
-                raise ValueError(f"{key}: {value!r} is no number")
+                raise ValueError(f"{key}: {value!r} is not a number")
             if _is_number(value) and not math.isfinite(value):
                 raise ValueError(f"{key}: {value} is not finite")
             if limits is not None and not limits[0] <= value <= limits[1]:
