@@ -201,8 +201,7 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     breathing_.assign((samples / kBreathingNode + 2) * lines + kRowSlack, 0.0f);
     prepare_nodes(tables);
     streaks_.resize(kMaxStreaks);
-    for (auto* per_beam : {&faces_.depth_mm, &faces_.dome_mm, &faces_.peak, &faces_.cosine})
-        per_beam->assign(lines + kRowSlack, 0.0f);
+    faces_.resize(lines + kRowSlack);
     plane_beams_.assign(4 * lines + kRowSlack, 0.0f);
     for (std::size_t l = 0; l < lines; ++l) {
         const auto& [o, d] =
@@ -776,11 +775,24 @@ void PhysicalFast::find_faces(const PhysicalFrame& f, const PhysicalBlock& base,
     for (int i = 0; i < std::min(kBeamBlock, nodes_.nodes - first); ++i) {
         FaceNode& face = faces_of_nodes_[first + i];
         face = {search.depth[i], 0};
-        if (search.dome[i] == 0 || !f.effects.diaphragm) continue;
-        const std::size_t at = nodes_.at(search.row[i], first + i);
-        face.peak =
-            dome_peak(scene_, {static_cast<double>(nodes_.x[at]), static_cast<double>(nodes_.y[at]),
-                               static_cast<double>(nodes_.z[at])});
+        if (face.depth_mm >= kNoFace) continue;
+        const auto node = [&](int row) {
+            const std::size_t at = nodes_.at(row, first + i);
+            return Point3{static_cast<double>(nodes_.x[at]), static_cast<double>(nodes_.y[at]),
+                          static_cast<double>(nodes_.z[at])};
+        };
+        const int row = search.row[i];
+        const Point3 behind = node(row), before = node(row - 1);
+        const int label = label_at(scene_, static_cast<int>(std::nearbyint(behind.x)),
+                                   static_cast<int>(std::nearbyint(behind.y)),
+                                   static_cast<int>(std::nearbyint(behind.z)));
+        if (scene_.is_lung[label]) {
+            const double part =
+                (static_cast<double>(face.depth_mm) - nodes_.spacing.r_mm(row - 1)) /
+                (nodes_.spacing.r_mm(row) - nodes_.spacing.r_mm(row - 1));
+            show_lung(scene_, f, before + part * (behind - before), face);
+        }
+        if (search.dome[i] != 0 && f.effects.diaphragm) face.peak = dome_peak(scene_, behind);
     }
 }
 
@@ -790,6 +802,8 @@ void PhysicalFast::show_faces(int line, PhysicalBlock& b) const {
     b.face_mm = faces_.depth_mm.data() + line;
     b.face_peak = faces_.peak.data() + line;
     b.cosine = faces_.cosine.data() + line;
+    b.face_tail = faces_.tail.data() + line;
+    b.reverb_loss = faces_.reverb_loss.data() + line;
     if (!faces_.any_dome) return;
     const float* dome = faces_.dome_mm.data() + line;
     if (std::all_of(dome, dome + kBeamBlock, [](float mm) { return mm >= kNoFace; })) return;

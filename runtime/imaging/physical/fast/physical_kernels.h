@@ -146,8 +146,9 @@ struct PhysicalBlock {
     const PhysicalRegion* region = nullptr;  // null: the case has none
     const PhysicalWall* wall = nullptr;      // null: off
     const float* face_mm = nullptr;          // per beam: face of gas; null: not known
-    const float *face_peak = nullptr, *cosine = nullptr;
-    const float* dome_mm = nullptr;  // null: none
+    const float *face_peak = nullptr, *cosine = nullptr, *face_tail = nullptr,
+                *reverb_loss = nullptr;  // GasFaces
+    const float* dome_mm = nullptr;      // null: none
     float dome_scale = 1, mirror_light = 0;
     const PhysicalStreak* streaks = nullptr;
     int streak_count = 0;
