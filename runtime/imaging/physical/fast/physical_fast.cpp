@@ -374,6 +374,39 @@ void PhysicalFast::choose_targets(const PhysicalFrame& f, bool keep_all) {
     }
 }
 
+// Finds the samples of a block of beams in which each of its targets can show: all but those whose
+// tissue lies, in the plane, further off than ball, press, breath and gap together reach.
+void PhysicalFast::place_targets(const PhysicalFrame& f,
+                                 const PhysicalBlock& b,
+                                 std::span<SampleRange> out) const {
+    const ScanGeometry& g = geometry_;
+    const int last = g.scanlines - 1, first = std::min(b.first_beam, last),
+              end = std::min(b.first_beam + kBeamBlock - 1, last), middle = (first + end) / 2;
+    if (b.keep_all || b.dome_mm != nullptr) {  // behind a mirror tissue shows elsewhere
+        std::fill_n(out.begin(), b.target_count, SampleRange{0, g.samples});
+        return;
+    }
+    double moved = norm(f.motion.breathing_mm) + kTargetReachMm + 0.5;
+    if (f.press != nullptr) moved += f.press->farthest_mm();
+    double gap = 0, aside = 0;
+    for (int l = first; l <= end; ++l) gap = std::max(gap, double{gaps_[l]});
+    for (const int l : {first, end}) {
+        for (const double r : {0.0, g.depth_mm}) {
+            const ScanGeometry::Beam &a = g.beams[l], &m = g.beams[middle];
+            const double x = a.origin.x - m.origin.x + r * (a.direction.x - m.direction.x),
+                         z = a.origin.z - m.origin.z + r * (a.direction.z - m.direction.z);
+            aside = std::max(aside, std::sqrt(x * x + z * z));
+        }
+    }
+    const Rigid probe_from_volume = inverse(f.volume_from_probe);
+    for (int t = 0; t < b.target_count; ++t) {
+        const PhysicalTarget& ball = b.targets[t];
+        const Point3 p = probe_from_volume * scene_.grid.point_from_voxel(
+                                                 {double{ball.x}, double{ball.y}, double{ball.z}});
+        out[t] = samples_near(g, middle, {p.x, p.z}, double{ball.reach_mm} + moved + gap + aside);
+    }
+}
+
 // Chooses the plates that the block's beams can show; if there are few beams, each may show all.
 static_assert(kBlockStreaks == kMaxStreaks);
 int PhysicalFast::choose_streaks(int first, std::span<PhysicalStreak> out) const {
@@ -579,6 +612,9 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         b.streaks = streaks.data();
         b.streak_count = choose_streaks(line, streaks);
         show_faces(line, b);
+        std::array<SampleRange, kMaxFrameBalls> target_rows;
+        if (b.target_count > 0) place_targets(f, b, target_rows);
+        b.target_rows = target_rows.data();
         PhysicalWall wall;
         if (wall_shows_) {
             place_wall(keep_all, line, wall);
@@ -668,9 +704,20 @@ void PhysicalFast::prepare_nodes(const Tables& tables) {
 // Moves nodes from where the beams run to where their tissue lies at rest.
 void PhysicalFast::press_nodes(int first, int end) {
     NodeLattice& n = nodes_;
-    const bool local = press_.field->needle().moves() || !press_.field->pools().empty();
+    const bool dents = press_.field->needle().moves();
+    const std::span<const SceneChange::Pool> pools = press_.field->pools();
     for (int node = first; node < end; ++node) {
         const int line = n.spacing.line(node);
+        // The samples that pools can move; where nothing else moves, the others stay.
+        SampleRange pushed{geometry_.samples, 0};
+        for (const SceneChange::Pool& pool : pools) {
+            const SampleRange near =
+                samples_near(geometry_, line, {pool.centre.x, pool.centre.z},
+                             kPoolReaches * pool.radius_mm + press_.field->farthest_mm());
+            if (near.begin >= near.end) continue;
+            pushed = {std::min(pushed.begin, near.begin), std::max(pushed.end, near.end)};
+        }
+        const bool still = !press_.pressed && !dents;
         float along[3], side[3];
         for (int axis = 0; axis < 3; ++axis) {
             along[axis] = n.per_mm[axis][node];
@@ -679,8 +726,10 @@ void PhysicalFast::press_nodes(int first, int end) {
         for (int row = 0; row < n.rows; ++row) {
             const int k = row * n.spacing.samples;
             if (k >= press_.active) break;
+            const bool pushes = k >= pushed.begin && k < pushed.end;
+            if (still && !pushes) continue;
             const press::PressView::Shift shift =
-                local ? press_.at(line, k) : press_.by_probe(line, k);
+                dents || pushes ? press_.at(line, k) : press_.by_probe(line, k);
             const std::size_t at = n.at(row, node);
             n.x[at] += along[0] * shift.along_mm + side[0] * shift.side_mm;
             n.y[at] += along[1] * shift.along_mm + side[1] * shift.side_mm;

@@ -154,6 +154,7 @@ struct PhysicalBlock {
     int streak_count = 0;
     const float* plane = nullptr;  // beams in the plane, `lines` apart: origin x, z, direction x, z
     const PhysicalTarget* targets = nullptr;
+    const SampleRange* target_rows = nullptr;  // samples of the block that each can show in
     int target_count = 0;
     Int3 size;
     int blocks_x = 0, blocks_xy = 0, block_log2 = 3;  // of the table: BrickTable
