@@ -397,10 +397,9 @@ Result<std::vector<SiteFile>> files_of(const SiteParts& site, const std::string&
             name.starts_with("words-") && name.ends_with(".json"))
             names.push_back(name);
     std::sort(names.begin(), names.end());
-    // A page that was built without its camera says so itself.
-    if (fs::exists(site.program + "/camera.wasm", failed))
-        for (const char* name : {"camera.js", "camera_worker.js", "camera.wasm"})
-            names.push_back(name);
+    // Those of trackers. A page that was built without its camera says so itself.
+    for (const char* name : {"camera.js", "camera_worker.js", "camera.wasm", "usb.js", "usb.wasm"})
+        if (fs::exists(site.program + "/" + name, failed)) names.push_back(name);
     if (site.course) {
         out.push_back(site.course->file);
         names.push_back("course.js");

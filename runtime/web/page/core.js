@@ -20,7 +20,7 @@ export const kDoppler = [
 export const kDopplerModes = ['off', 'colour', 'power', 'spectral', 'm_mode'];
 
 // What put_tools() is told, in the order of exports.cpp.
-const kToolStates = ['absent', 'good', 'poor', 'lost'], kTrackers = ['', 'poses', 'camera'];
+const kToolStates = ['absent', 'good', 'poor', 'lost'], kTrackers = ['', 'poses', 'camera', 'usb'];
 
 export const kFrameStatus = ['rendered', 'held_bad_pose', 'no_contact'];
 

@@ -75,7 +75,7 @@ export class ScanPage {
         click('next-hint', () => this.next_hint());
         click('skip-guide', () => this.skip_guide());
         $('mode').addEventListener('change', () => this.touched());
-        click('camera', () => this.toggle_camera());
+        for (const name of ['camera', 'usb']) click(name, () => this.toggle_tracker(name));
         click('level', () => this.level());
         click('flip', () => this.flip());
         click('measure', () => this.measure(!this.measuring));
@@ -208,7 +208,7 @@ export class ScanPage {
     touched() { this.moved = true; }
     // A tracker's newest pose moves the tools; hands move them again from there on.
     take_pose(now_s) {
-        const poses = (this.camera ?? this.poses)?.take();
+        const poses = (this.camera ?? this.usb ?? this.poses)?.take();
         if (!poses) return;
         this.core.put_tools(now_s, poses.probe, poses.needle, poses.states, poses.tracker);
         this.moved = true;
@@ -441,32 +441,36 @@ export class ScanPage {
         this.core.calls.advance_needle(mm - this.values.needle_depth_mm);
         this.touched();
     }
-    // Its part of the page, its worker and its program are fetched here, and the user is asked.
-    async toggle_camera() {
-        const show = (camera) => {
-            this.camera = camera;
-            $('camera').setAttribute('aria-pressed', String(camera !== null));
-            $('camera-room').hidden = camera === null;
+    // The tracker of a button: its part of the page and its program are fetched here, and the user is asked. `name`: camera or
+    // usb; one at a time.
+    async toggle_tracker(name) {
+        const show = (tracker) => {
+            this[name] = tracker;
+            $(name).setAttribute('aria-pressed', String(tracker !== null));
+            $(`${name}-room`).hidden = tracker === null;
         };
-        if (this.camera) {
-            this.camera.stop();
+        if (this[name]) {
+            this[name].stop();
             show(null);
             return;
         }
+        const other = name === 'camera' ? 'usb' : 'camera';
+        if (this[other]) await this.toggle_tracker(other);
         this.notice('');
         try {
-            if (!kCamera) throw new PlainError(t('This page was built without the camera.'));
-            if (inside_page('program')) throw new PlainError(t('A page in one file cannot use the camera: open the site instead.'));
-            const {CameraTracker} = await import('./camera.js').catch(() => {
-                throw new PlainError(t('The program of the camera did not load. Check the network, then press Camera again.'));
+            if (name === 'camera' && !kCamera) throw new PlainError(t('This page was built without the camera.'));
+            if (inside_page('program')) throw new PlainError(name === 'camera' ? t('A page in one file cannot use the camera: open the site instead.') : t('A page in one file cannot use a tracker on USB: open the site instead.'));
+            const {CameraTracker, UsbTracker} = await (name === 'camera' ? import('./camera.js') : import('./usb.js')).catch(() => {
+                throw new PlainError(name === 'camera' ? t('The program of the camera did not load. Check the network, then press Camera again.')
+                    : t('The program of the tracker did not load. Check the network, then press USB tracker again.'));
             });
-            if (this.camera) return;  // pressed twice
+            if (this[name]) return;  // pressed twice
             const ended = (words) => { show(null); this.notice(words); };
-            const camera = new CameraTracker(this, $('camera-room'), ended);
-            show(camera);
-            await camera.start();
+            const tracker = new (CameraTracker ?? UsbTracker)(this, $(`${name}-room`), ended);
+            show(tracker);
+            await tracker.start();
         } catch (error) {
-            this.camera?.stop();
+            this[name]?.stop();
             show(null);
             if (!(error instanceof PlainError)) throw error;
             this.notice(error.message);

@@ -376,7 +376,7 @@ SONOCASE_EXPORT(poses) double* poses() {
 // States: SensorState, in the order of kToolStates of page/core.js. tracker: of kTrackers there.
 SONOCASE_EXPORT(put_tools)
 void put_tools(double now_s, int probe_state, int needle_state, int tracker) {
-    constexpr const char* kTrackers[] = {"", "poses", "camera"};
+    constexpr const char* kTrackers[] = {"", "poses", "camera", "usb"};
     TrackerReading reading;
     reading.time_s = now_s;
     reading.in_mannequin = true;
