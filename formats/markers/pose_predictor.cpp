@@ -58,7 +58,8 @@ struct Motion {
     }
 
     // The way in the next seconds. A motion that slows down goes on slowing down, until it rests;
-    // one that gains speed is not known to go on so.
+    // one that gains speed is not known to go on so. Not for turns, whose noise is larger than what
+    // their slowing tells.
     Vector3 ahead(double seconds) const {
         const double speed = norm(velocity), rate = norm(slowing);
         const double t = rate * seconds > speed ? speed / rate : seconds;
@@ -153,7 +154,7 @@ Rigid PosePredictor::follow(const MarkerReading& reading, double time_s, double 
     const double ahead_s = std::max(0.0, at_s - time_s);
     Rigid out;
     out.rotation =
-        nearest_rotation(turned_by(shortened(s.turn.ahead(ahead_s), o.max_rad)) * s.rotation);
+        nearest_rotation(turned_by(shortened(ahead_s * s.turn.velocity, o.max_rad)) * s.rotation);
     const Point3 tool = s.place + shortened(s.way.ahead(ahead_s), o.max_mm);
     out.translation = tool - out.rotation * (s.tool_body - Point3{}) - Point3{};
     return out;

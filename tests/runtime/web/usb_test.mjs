@@ -228,7 +228,7 @@ await run_tests({
             }
     },
     async one_in_use_or_not_allowed_says_so_and_begins_once_it_may() {
-        for (const [setup, english, german] of [['busy', 'Polhemus Viper is in use by another program', 'wird von einem anderen Programm benutzt'],
+        for (const [setup, english, german] of [['busy', 'Polhemus Viper is in use by another program', 'ist von einem anderen Programm belegt'],
             ['denied', 'This computer does not let the browser use the Polhemus Viper', 'Dieser Rechner lässt den Browser den Polhemus Viper nicht benutzen']])
             for (const [query, words] of [['', english], ['&lang=de', german]]) {
                 const page = await scanning(query, `globalThis.device = navigator.usb.plug("Viper"); device.${setup} = true;`);
