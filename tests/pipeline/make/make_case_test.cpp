@@ -230,6 +230,23 @@ TEST_F(MakeCase, one_organ_with_its_ct_becomes_a_case_for_that_organ) {
     EXPECT_TRUE(outcome.decided("no exercise kidney-access: there is no 'kidney_right'"));
 }
 
+TEST_F(MakeCase, an_organ_of_the_left_has_the_exercises_of_the_right) {
+    Study{.drawn = [](const std::string& name) { return name == "kidney_left"; }}.write(folder_,
+                                                                                        "disc");
+    const Outcome outcome = make("disc");
+    ASSERT_TRUE(outcome.made) << outcome.sentence;
+    EXPECT_TRUE(outcome.decided("no exercise kidney-access: there is no 'kidney_right'"));
+    EXPECT_TRUE(outcome.decided("exercise kidney-access-left: target in 'kidney_left'"));
+    const std::string toml = read_text(folder_ / "case/kidney-access-left.toml");
+    const auto exercise = parse_exercise(toml, "kidney-access-left");
+    ASSERT_TRUE(exercise) << exercise.error().message();
+    EXPECT_EQ(exercise->name, "kidney-access-left");
+    EXPECT_EQ(exercise->title, "Access to the lower calyx of the left kidney");
+    for (const char* word : {"right kidney", "_right", "rechte", "liver", "Leber"})
+        EXPECT_EQ(toml.find(word), std::string::npos) << word;
+    EXPECT_NE(toml.find("bright"), std::string::npos) << "a part of another word";
+}
+
 TEST_F(MakeCase, a_head_alone) {
     Study head;
     for (Label& label : head.labels.labels)
