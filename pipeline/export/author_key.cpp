@@ -44,6 +44,7 @@ std::optional<std::array<std::uint8_t, kKeyBytes>> key_in(std::string_view text,
     const std::size_t to = text.find("-----END " + kind + " KEY-----");
     if (from == text.npos || to == text.npos || to < from + begin.size()) return std::nullopt;
     const std::string_view inside = text.substr(from + begin.size(), to - from - begin.size());
+    if (inside.find('\0') != inside.npos) return std::nullopt;
     std::array<std::uint8_t, 64> der{};
     std::size_t size = 0;
     const bool good =
