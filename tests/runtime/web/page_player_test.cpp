@@ -61,6 +61,68 @@ TEST(PagePlayer, a_kept_picture_is_rendered_again_to_the_same_pixels) {
     }
 }
 
+TEST(PagePlayer, an_attempt_that_ended_is_looked_at_again_from_any_moment) {
+    const auto player = open_small();
+    EXPECT_EQ(player->look_at_attempt(0), -1) << "there was none";
+    ASSERT_TRUE(player->start_attempt("", "2026-01-31T12:00:00Z", 50));
+    EXPECT_EQ(player->look_at_attempt(0), -1) << "it runs";
+    std::vector<std::vector<std::uint8_t>> shown;
+    constexpr int kFrames = 400;
+    for (int n = 0; n < kFrames; ++n) {
+        player->hands().slide(0, n < 200 ? 0.1 : -0.1);
+        player->frame(50 + 0.1 * n, {});
+        shown.push_back(copy(player->pixels()));
+    }
+    ASSERT_TRUE(player->finish_attempt());
+    for (const int n : {0, 7, 250, kFrames - 1}) {
+        const int back = player->look_at_attempt(0.1 * n + 0.05);
+        ASSERT_EQ(back, kFrames - 1 - n);
+        ASSERT_EQ(player->kept(), kFrames);
+        player->frame_again(back, {});
+        EXPECT_EQ(copy(player->pixels()), shown[static_cast<std::size_t>(n)]) << n;
+    }
+    EXPECT_EQ(player->look_at_attempt(-5), kFrames - 1) << "before it began: its first";
+    EXPECT_EQ(player->look_at_attempt(1e9), 0);
+    player->frame(100, {});
+    EXPECT_EQ(player->kept(), kFrames + 1) << "live again: the ring goes on where it was";
+    ASSERT_TRUE(player->choose_exercise(0, 128));
+    EXPECT_EQ(player->look_at_attempt(0), -1) << "another exercise";
+}
+
+TEST(PagePlayer, a_long_attempt_keeps_fewer_pictures_a_second) {
+    const auto player = open_small();
+    ASSERT_TRUE(player->choose_exercise(0, 16));
+    ASSERT_TRUE(player->start_attempt("", "2026-01-31T12:00:00Z", 0));
+    for (int n = 0; n < 3300; ++n) player->frame(0.1 * n, {});
+    ASSERT_TRUE(player->finish_attempt());
+    const int back = player->look_at_attempt(165);
+    EXPECT_GT(player->kept(), 1500);
+    EXPECT_LT(player->kept(), 3000);
+    EXPECT_NEAR(player->kept_age_s(back), 329.9 - 165, 0.3);
+}
+
+TEST(PagePlayer, a_signature_is_checked_bit_by_bit) {
+    const std::vector<std::uint8_t> plain = write_bundle(testing::small_case());
+    const SigningKey key{{1, 2, 3}};
+    const auto made = signed_case(plain, key, "Anna", "small");
+    ASSERT_TRUE(made);
+    const auto said = [](const std::vector<std::uint8_t>& bytes) {
+        auto player = PagePlayer::open({bytes.begin(), bytes.end()}, "small");
+        EXPECT_TRUE(player);
+        const CaseSignature* found = nullptr;
+        int steps = 1;
+        while (!(found = (*player)->check_signature())) ++steps;
+        return std::pair{*found, steps};
+    };
+    EXPECT_EQ(said(plain).first.fit, SignatureFit::none);
+    EXPECT_EQ(said(plain).second, 1) << "nothing is paid without one";
+    const auto [found, steps] = said(*made);
+    EXPECT_EQ(found.fit, SignatureFit::fits);
+    EXPECT_GT(steps, 5);
+    EXPECT_EQ(signature_json(found), "{\"fit\":\"fits\",\"name\":\"Anna\",\"fingerprint\":\"" +
+                                         fingerprint_of(public_key_of(key)) + "\"}");
+}
+
 TEST(PagePlayer, an_attempt_is_scored_as_its_recording_is) {
     const auto player = open_small();
     ASSERT_TRUE(player->start_attempt("somebody", "2026-01-31T12:00:00Z", 50));
