@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // web-pack.mjs PAGE WASM OUT: what `sonocase publish` copies. The page's modules become one script, so that a visit
-// asks for few files; those of a course become another, and that of the camera a third, where WASM has its program. single.html holds page, style, script and program in one file;
+// asks for few files; those of a course become another, and those of the page's trackers more of them. single.html holds page, style, script and program in one file;
 // its places <!--LIST--> and <!--CASES--> are publish's to fill.
 import {createHash} from 'node:crypto';
 import {existsSync, mkdirSync, readFileSync, writeFileSync} from 'node:fs';
@@ -13,9 +13,10 @@ const hash = (data) => createHash('sha256').update(data).digest('base64');
 
 // Modules in the order in which they need each other. Each imports by one line per module and exports declarations
 // only, and top-level names are unique: then the text without those words is the same program.
-const modules = ['words.js', 'core.js', 'source.js', 'arriving.js', 'results.js', 'picture.js', 'poses.js', 'scan_keys.js', 'hands.js', 'doppler.js', 'view3d.js', 'scan.js', 'app.js'];
+const modules = ['words.js', 'core.js', 'source.js', 'arriving.js', 'results.js', 'picture.js', 'poses.js', 'scan_keys.js', 'hands.js', 'doppler.js', 'view3d.js', 'scan.js', 'placed_tracker.js', 'app.js'];
 const of_course = ['lms.js', 'course.js'];  // fetched where a site has a course
 const of_camera = ['camera.js'], has_camera = existsSync(`${wasm}/camera.wasm`);  // fetched when it is chosen, with worker and program
+const of_usb = ['usb.js'];  // so is that of trackers on USB, with its program
 const seen = new Map(), asked = new Set();
 // The text, and what it needs of the script, which is to export it.
 function packed(names) {
@@ -62,18 +63,20 @@ const part = ({text, needs}, name) => `${licence}import {${needs}} from './sonop
 const course = part(packed(of_course), 'CourseView');
 const camera = has_camera ? {'camera.js': part(packed(of_camera), 'CameraTracker'), 'camera_worker.js': read('camera_worker.js'),
     'camera.wasm': readFileSync(`${wasm}/camera.wasm`)} : {};
+const usb = {'usb.js': part(packed(of_usb), 'UsbTracker'), 'usb.wasm': readFileSync(`${wasm}/usb.wasm`)};
+const trackers = {...camera, ...usb};
 const script = `${licence}${main}export {${[...asked].sort().join(', ')}};\n`;
 
 mkdirSync(out, {recursive: true});
 for (const {file, text} of catalogues) writeFileSync(`${out}/${file}`, text);
 const style = read('style.css'), index = read('index.html'), binary = readFileSync(`${wasm}/sonoplay.wasm`);
 const scalar = readFileSync(`${wasm}/sonoplay-scalar.wasm`);
-const version = Object.values(camera).reduce((all, one) => all.update(one), createHash('sha256')).update(script).update(course).update(style).update(index).update(binary).update(scalar).update(catalogues.map(({text}) => text).join()).digest('hex').slice(0, 16);
+const version = Object.values(trackers).reduce((all, one) => all.update(one), createHash('sha256')).update(script).update(course).update(style).update(index).update(binary).update(scalar).update(catalogues.map(({text}) => text).join()).digest('hex').slice(0, 16);
 writeFileSync(`${out}/index.html`, index);
 writeFileSync(`${out}/style.css`, style);
 writeFileSync(`${out}/sonoplay.js`, script);
 writeFileSync(`${out}/course.js`, course);
-for (const [name, data] of Object.entries(camera)) writeFileSync(`${out}/${name}`, data);
+for (const [name, data] of Object.entries(trackers)) writeFileSync(`${out}/${name}`, data);
 writeFileSync(`${out}/worker.js`, read('worker.js').replace('@VERSION@', version).replace('@WORDS@', catalogues.map(({file}) => file).join("', '")));
 writeFileSync(`${out}/sonoplay.wasm`, binary);
 writeFileSync(`${out}/sonoplay-scalar.wasm`, scalar);

@@ -66,6 +66,6 @@ export function page_catalogues(root) {
         const kept = Object.keys(words).filter((english) => asked.has(english) || program.has(english)).sort();
         return {code, name: called, words: {...Object.fromEntries(kept.map((english) => [english, words[english]])), ...own},
             missing: [...asked].filter((english) => !(english in words) && !(english in own)).sort(),
-            twice: Object.keys(own).filter((english) => english in words), unused: Object.keys(own).filter((english) => !asked.has(english))};
+            twice: Object.keys(own).filter((english) => english in words), unused: Object.keys(own).filter((english) => !asked.has(english) && !program.has(english))};
     });
 }

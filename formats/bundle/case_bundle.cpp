@@ -352,8 +352,8 @@ Result<StreamedBundle> stream_bundle(RawVector<std::uint8_t> bytes,
     if (packed.blocks) {
         packed.blocks->use_small_pages();
         out.blocks_ = std::move(packed.blocks);
-        out.bytes_ = std::move(bytes);  // the storage stays where the blocks refer to it
     }
+    out.bytes_ = std::move(bytes);  // the storage stays where the blocks refer to it
     return out;
 }
 

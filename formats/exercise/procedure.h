@@ -107,6 +107,10 @@ struct SceneChange {
     // Radius of the first targets over that as drawn: they shrink as they are drained.
     std::array<double, kMaxTargets> target_scale{1, 1, 1, 1, 1, 1, 1, 1};
     Line wire, catheter;
+    struct Air {  // a pneumothorax: between lung and chest wall within this distance
+        Point3 centre;
+        double radius_mm = 0;
+    } air;
     struct Level {  // the surface of a free fluid
         Vector3 up{0, 1, 0};
         double mm = 0;  // above the fluid's centre

@@ -35,10 +35,11 @@ Vector3 shortened(Vector3 v, double longest) {
 // what update() says.
 struct Motion {
     Vector3 velocity;
+    Vector3 slowing;  // acceleration against the velocity, from the last two poses
     Matrix6 covariance = Matrix6::Zero();
 
     void start(const Eigen::Matrix3d& measured, double speed_sigma) {
-        velocity = {};
+        velocity = slowing = {};
         covariance.setZero();
         covariance.topLeftCorner<3, 3>() = measured;
         covariance.bottomRightCorner<3, 3>().diagonal().setConstant(speed_sigma * speed_sigma);
@@ -56,16 +57,27 @@ struct Motion {
         return p;
     }
 
+    // The way in the next seconds. A motion that slows down goes on slowing down, until it rests;
+    // one that gains speed is not known to go on so. Not for turns, whose noise is larger than what
+    // their slowing tells.
+    Vector3 ahead(double seconds) const {
+        const double speed = norm(velocity), rate = norm(slowing);
+        const double t = rate * seconds > speed ? speed / rate : seconds;
+        return t * velocity + (0.5 * t * t) * slowing;
+    }
+
     // off: measured less predicted coordinates. Returns what is to be added to the predicted ones.
     Vector3 update(Vector3 off, const Eigen::Matrix3d& measured, double dt, double acceleration) {
         const Eigen::Vector3d innovation{off.x, off.y, off.z};
         Matrix6 p = predicted(dt, acceleration);
         Eigen::Matrix3d spread = p.topLeftCorner<3, 3>() + measured;
-        // A hand that sets off or stops suddenly: more acceleration than was expected.
+        // A hand that sets off or stops suddenly: more acceleration than was expected. Its standard
+        // deviation is not all that would explain the surprise, a part of which is noise.
         constexpr double kSurprise = 16;  // 99.9 % of a normal distribution in three dimensions
+        constexpr double kPart = 0.3;
         const double chi = innovation.dot(spread.llt().solve(innovation));
         if (chi > kSurprise) {
-            const double needed = 0.5 * innovation.norm() / (dt * dt);
+            const double needed = kPart * innovation.norm() / (dt * dt);
             p = predicted(dt, std::max(acceleration, needed));
             spread = p.topLeftCorner<3, 3>() + measured;
         }
@@ -74,7 +86,11 @@ struct Motion {
         const Vector6 change = gain * innovation;
         covariance = p - gain * p.topRows<3>();
         covariance = 0.5 * (covariance + covariance.transpose()).eval();
-        velocity = velocity + Vector3{change[3], change[4], change[5]};
+        const Vector3 change_of_velocity{change[3], change[4], change[5]};
+        const double along = dot(change_of_velocity, velocity), square = dot(velocity, velocity);
+        slowing = along < 0 && square > 0 ? (along / (square * dt)) * velocity : Vector3{};
+        velocity = velocity + change_of_velocity;
+        if (!(dot(slowing, velocity) < 0)) slowing = {};  // it turned back
         return {change[0], change[1], change[2]};
     }
 };
@@ -139,7 +155,7 @@ Rigid PosePredictor::follow(const MarkerReading& reading, double time_s, double 
     Rigid out;
     out.rotation =
         nearest_rotation(turned_by(shortened(ahead_s * s.turn.velocity, o.max_rad)) * s.rotation);
-    const Point3 tool = s.place + shortened(ahead_s * s.way.velocity, o.max_mm);
+    const Point3 tool = s.place + shortened(s.way.ahead(ahead_s), o.max_mm);
     out.translation = tool - out.rotation * (s.tool_body - Point3{}) - Point3{};
     return out;
 }

@@ -7,6 +7,8 @@
 // which One-Euro has only as an aside, and because every pose brings its own covariance, of which a
 // camera's is ten times longer along its axis than across it. From One-Euro comes the idea that
 // stills the hand and follows the stroke: the acceleration that is expected grows with the speed.
+// What a hand does after the last picture nothing tells: one that sets off or stops at a mm/s2 is
+// shown off by up to a t^2 / 2, 1 mm for 1000 mm/s2 and t = 45 ms.
 #pragma once
 
 #include <memory>

@@ -13,9 +13,13 @@
 namespace sonocase {
 namespace {
 
-constexpr int kCorners = 8, kUnknowns = 12;  // then black, white, blur along u and along v
+// The corners, then black, white, blur along u and along v, then Unknowns::beyond.
+constexpr int kCorners = 8, kBeyond = 12, kUnknowns = 16;
 constexpr double kMinBlur = 0.3, kMaxBlur = 6, kStartBlur = 0.8;  // pixels
-constexpr double kMargin = 0.5;    // of white round the square, in cells
+// Of white round the square, in cells. There a side of a body ends, and through the blur what lies
+// beyond it reaches the square's edge: another side's white or the ground. Taken for the tag's own
+// white it would move all four edges.
+constexpr double kMargin = 0.5;
 constexpr double kMinNoise = 0.6;  // grey values: rounding alone has 0.3
 // Errors of neighbouring pixels go together (compression, blur of another shape, uneven light), so
 // that corners are less certain than as many independent pixels would make them. The factor is
@@ -33,6 +37,13 @@ struct BellTable {
             step[i] = static_cast<float>(0.5 * std::erfc(-t / std::sqrt(2.0)));
             bell[i] = static_cast<float>(0.3989422804014327 * std::exp(-0.5 * t * t));
         }
+    }
+    void look_up(float t, float& step_of_t, float& bell_of_t) const {
+        const float place = std::clamp((t + kReach) * kPerUnit, 0.0f, kSize - 1.0f);
+        const int i = static_cast<int>(place);
+        const float f = place - static_cast<float>(i);
+        step_of_t = step[i] + f * (step[i + 1] - step[i]);
+        bell_of_t = bell[i] + f * (bell[i + 1] - bell[i]);
     }
 };
 const BellTable& bells() {
@@ -57,12 +68,9 @@ inline void axis_weights(
     for (int k = 0; k < 2 * reach; ++k) {
         // How much lies below the border of cell `first + k + 1`.
         const float t = (static_cast<float>(out.first + k + 1) - at) * inv_blur;
-        const float place = std::clamp((t + BellTable::kReach) * BellTable::kPerUnit, 0.0f,
-                                       BellTable::kSize - 1.0f);
-        const int i = static_cast<int>(place);
-        const float f = place - static_cast<float>(i);
-        const float next_step = table.step[i] + f * (table.step[i + 1] - table.step[i]);
-        const float density = (table.bell[i] + f * (table.bell[i + 1] - table.bell[i])) * inv_blur;
+        float next_step, density;
+        table.look_up(t, next_step, density);
+        density *= inv_blur;
         const float next_arm = -t * density;  // d step / d blur
         out.weight[k] = next_step - step;
         out.by_place[k] = -density - bell;
@@ -72,6 +80,28 @@ inline void axis_weights(
     out.weight[2 * reach] = 1 - step;
     out.by_place[2 * reach] = -bell;
     out.by_blur[2 * reach] = -arm;
+}
+
+// How much a blurred point sees of what lies beyond the low and the high end of one axis, with
+// derivatives.
+struct BeyondWeights {
+    float weight[2], by_place[2], by_blur[2];
+};
+
+// at, blur: in cells. False: too far away to see anything of it.
+inline bool beyond_weights(const BellTable& table, float at, float inv_blur, BeyondWeights& out) {
+    constexpr float kLow = -static_cast<float>(kMargin), kHigh = kTagCells - kLow;
+    const float past[2] = {(kLow - at) * inv_blur, (at - kHigh) * inv_blur};
+    constexpr float kUnseen = -3.5f;  // standard deviations
+    if (std::max(past[0], past[1]) < kUnseen) return false;
+    for (int end = 0; end < 2; ++end) {
+        float density;
+        table.look_up(past[end], out.weight[end], density);
+        density *= inv_blur;
+        out.by_place[end] = end == 0 ? -density : density;
+        out.by_blur[end] = -past[end] * density;
+    }
+    return true;
 }
 
 // The homography that takes (u, v) = (0, 0), (8, 0), (8, 8), (0, 8), counted in cells from the
@@ -127,6 +157,8 @@ bool turns_one_way(const std::array<Pixel, 4>& p) {
 struct Unknowns {
     std::array<Pixel, 4> corners;
     double black = 0, white = 0, blur_u = 1, blur_v = 1;  // blur in pixels
+    // Grey less white beyond the left, right, lower and upper end.
+    std::array<double, 4> beyond{};
 };
 
 struct Region {
@@ -193,6 +225,9 @@ bool sums_of(
         for (int g = 0; g < kGroups; ++g) normal[a][g].setZero();
     for (int g = 0; g < kGroups; ++g) right[g].setZero();
     AxisWeights wu, wv;
+    BeyondWeights bu{}, bv{};
+    float beyond[4];
+    for (int k = 0; k < 4; ++k) beyond[k] = static_cast<float>(at.beyond[k]);
     for (int n = 0; n < pixels.count; ++n) {
         if (!quad.inside(pixels.x[n], pixels.y[n], u, v, slope)) return false;
         constexpr float kRim = 1;  // the pattern moves while it is fitted
@@ -216,14 +251,30 @@ bool sums_of(
             by_blur_u += wv.weight[j] * line_blur;
             by_blur_v += wv.by_blur[j] * line;
         }
-        const float r = black + height * value - pixels.grey[n];
+        by_u *= height, by_v *= height, by_blur_u *= height, by_blur_v *= height;
+        float r = black + height * value - pixels.grey[n];
+        Four ends = Four::Zero();  // how much of what lies beyond each is seen
+        const bool end_u = beyond_weights(table, u, inv_blur_u, bu);
+        const bool end_v = beyond_weights(table, v, inv_blur_v, bv);
+        for (int end = 0; end_u && end < 2; ++end) {
+            ends[end] = bu.weight[end];
+            r += beyond[end] * bu.weight[end];
+            by_u += beyond[end] * bu.by_place[end];
+            by_blur_u += beyond[end] * bu.by_blur[end];
+        }
+        for (int end = 0; end_v && end < 2; ++end) {
+            ends[2 + end] = bv.weight[end];
+            r += beyond[2 + end] * bv.weight[end];
+            by_v += beyond[2 + end] * bv.by_place[end];
+            by_blur_v += beyond[2 + end] * bv.by_blur[end];
+        }
         const float size = std::abs(r);
         const float weight = size <= bound ? 1 : bound / size;
         out.square += weight * r * r;
         out.cost += size <= bound ? r * r : bound * (2 * size - bound);
         // A corner that moves takes its share of (u, v) along; the pattern seen at this pixel
         // moves the other way.
-        const float scale = -height / (slope[0] * slope[3] - slope[1] * slope[2]);
+        const float scale = -1 / (slope[0] * slope[3] - slope[1] * slope[2]);
         const float by_x = scale * (by_u * slope[3] - by_v * slope[2]);
         const float by_y = scale * (by_v * slope[0] - by_u * slope[1]);
         const float su = u / kTagCells, sv = v / kTagCells;
@@ -232,8 +283,10 @@ bool sums_of(
         for (int k = 0; k < 2; ++k)
             j[k] = Four(by_x * share[2 * k], by_y * share[2 * k], by_x * share[2 * k + 1],
                         by_y * share[2 * k + 1]);
-        j[2] = Four(1 - value, value, height * by_blur_u / px_u, height * by_blur_v / px_v);
-        for (int g = 0; g < kGroups; ++g) {
+        j[2] = Four(1 - value, value, by_blur_u / px_u, by_blur_v / px_v);
+        j[3] = ends;
+        const int groups = end_u || end_v ? kGroups : kGroups - 1;
+        for (int g = 0; g < groups; ++g) {
             const Four scaled = weight * j[g];
             right[g] -= r * scaled;
             for (int k = 0; k < 4; ++k)
@@ -244,9 +297,16 @@ bool sums_of(
         for (int b = 0; b <= a; ++b) out.normal(a, b) = normal[a][b / 4][b % 4];
         out.right[a] = right[a / 4][a % 4];
     }
-    // The blur is held near what it was where the picture does not tell.
-    for (int k = 10; k < kUnknowns; ++k)
+    // The blur is held near what it was where the picture does not tell, and what lies beyond near
+    // white.
+    for (int k = 10; k < kBeyond; ++k)
         out.normal(k, k) += 1e-3 * static_cast<double>(height) * height;
+    constexpr double kBeyondHeld = 0.02;
+    for (int k = 0; k < 4; ++k) {
+        out.normal(kBeyond + k, kBeyond + k) += kBeyondHeld;
+        out.right[kBeyond + k] -= kBeyondHeld * at.beyond[k];
+        out.cost += kBeyondHeld * at.beyond[k] * at.beyond[k];
+    }
     return true;
 }
 
@@ -361,6 +421,9 @@ bool fit_tag(const GreyPicture& picture, SeenTag& tag, int max_pixels) {
         const double min_blur = used == &few ? kStartBlur : kMinBlur;
         next.blur_u = std::clamp(next.blur_u + step[10], min_blur, kMaxBlur);
         next.blur_v = std::clamp(next.blur_v + step[11], min_blur, kMaxBlur);
+        for (int k = 0; k < 4; ++k)
+            next.beyond[k] =
+                std::clamp(next.beyond[k] + step[kBeyond + k], -next.white, 255 - next.white);
         if (!(moved < 20) || !turns_one_way(next.corners)) return false;
         Sums then;
         if (!sums_of(*used, pattern, next, limit, then)) return false;

@@ -6,7 +6,9 @@
 // A tag's corner is no saddle, so that the usual sub-pixel search there is off by ten times more;
 // and lines fitted to the four outer edges alone are drawn aside by the cells behind the border,
 // since a cell of a small tag is hardly wider than the blur. Unknowns are the four corners, black,
-// white, and the blur along both axes of the tag, so that defocus and motion are allowed for.
+// white, the blur along both axes of the tag, so that defocus and motion are allowed for, and how
+// bright it is half a cell beyond each edge, where a body is folded: taken for white, what lies
+// there moves the whole tag by up to a tenth of a pixel.
 // Pixels that do not fit (a finger, a glare) weigh little.
 #pragma once
 

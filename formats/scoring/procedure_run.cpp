@@ -29,6 +29,8 @@ constexpr double kThrowStepMm = 0.5;
 constexpr double kWireMm = 450, kWireHeldMm = 50;
 constexpr double kShownWireMm = 60;  // drawn beyond the tip, at most
 constexpr double kBleedMlS = 0.2, kMaxBledMl = 60, kStopBleedingS = 30;
+// Air that leaks from a lung spreads this fast, and this far (a).
+constexpr double kAirMmS = 6, kMaxAirMm = 60;
 constexpr double kLongestStepS = 1;  // time of acts that last does not run on across a gap
 constexpr double kClosedVein = 0.1;  // share of its area at rest
 constexpr double kBeyondMm = 1;      // deeper than a collection's far side
@@ -368,6 +370,12 @@ void ProcedureRun::bleed(Point3 rest, double time_s) {
     state_.bleeding_compressed_s = 0;
 }
 
+void ProcedureRun::hit_lung(Point3 rest, double time_s) {
+    if (state_.complication_s[static_cast<std::size_t>(ComplicationKind::pneumothorax)] < 0)
+        state_.air.centre = rest;
+    happened(ComplicationKind::pneumothorax, time_s);
+}
+
 // The collection that catheter or tip lie in; -1: none.
 int ProcedureRun::collection(const Facts& f) const {
     if (catheter_region_ >= 0) return catheter_region_;
@@ -503,7 +511,7 @@ void ProcedureRun::core_throw(double mm, const Facts& f) {
                 if (!bleeds) bled = rest;
                 bleeds = true;
                 break;
-            case kLung: happened(ComplicationKind::pneumothorax, f.time_s); break;
+            case kLung: hit_lung(rest, f.time_s); break;
             case kBowel: happened(ComplicationKind::bowel_punctured, f.time_s); break;
             case kBile: happened(ComplicationKind::gallbladder_punctured, f.time_s); break;
             default: break;
@@ -648,7 +656,7 @@ void ProcedureRun::watch_needle(const Facts& f) {
     // A tip in a collection touches nothing of what the collection was put into.
     const bool in_fluid = f.region >= 0 && full_ml_[static_cast<std::size_t>(f.region)] > 0;
     if (!in_fluid) {
-        if (kind == kLung) happened(ComplicationKind::pneumothorax, f.time_s);
+        if (kind == kLung) hit_lung(f.tip_rest, f.time_s);
         if (kind == kArtery) happened(ComplicationKind::artery_punctured, f.time_s);
         if (kind == kBowel) happened(ComplicationKind::bowel_punctured, f.time_s);
         if (kind == kBile) happened(ComplicationKind::gallbladder_punctured, f.time_s);
@@ -806,6 +814,9 @@ void ProcedureRun::update(double time_s,
         }
     }
 
+    if (state_.complication_s[static_cast<std::size_t>(ComplicationKind::pneumothorax)] >= 0)
+        state_.air.radius_mm = std::min(state_.air.radius_mm + kAirMmS * f.dt_s, kMaxAirMm);
+
     const Procedure& p = exercise_->procedure;
     for (std::size_t s = 0; s < p.steps.size(); ++s) {
         ProcedureState::Step& step = state_.steps[s];
@@ -926,6 +937,7 @@ SceneChange ProcedureRun::scene() const {
             out.target_scale[t] = std::cbrt(left_ml_[t] / full_ml_[t]);
     out.wire = wire_;
     out.catheter = catheter_;
+    out.air = state_.air;
     for (const Fluid& fluid : fluids_)
         out.levels[static_cast<std::size_t>(out.level_count++)] = fluid.level;
     const VeinState veins =

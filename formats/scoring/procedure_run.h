@@ -118,6 +118,7 @@ struct ProcedureState {
     bool strains = false;      // against closed lips
     double turned_deg = 0;     // of the patient, onto the left side
     int bleeding_pool = -1;
+    SceneChange::Air air;  // of a pneumothorax, around the place at rest where the lung was hit
 };
 
 // What a screen shows of it; a value, so that it can cross threads with its frame.
@@ -242,6 +243,7 @@ class ProcedureRun {
     void aspirate(double ml, const Facts& facts);
     void core_throw(double mm, const Facts& facts);
     void bleed(Point3 rest, double time_s);
+    void hit_lung(Point3 rest, double time_s);
     Point3 wire_end(const Facts& facts, double mm) const;
     // Which free fluid a region is; -1: none.
     int fluid_of(std::size_t region) const {

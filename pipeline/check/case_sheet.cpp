@@ -18,7 +18,7 @@ namespace sonocase::pipeline::inline check {
 
 namespace {
 
-constexpr int kPanelPx = 380, kCaptionPx = 26, kGapPx = 10, kColumns = 3;
+constexpr int kPanelPx = kSheetPx, kCaptionPx = 26, kGapPx = 10, kColumns = 4;
 
 using Colour = std::array<std::uint8_t, 3>;
 
@@ -174,6 +174,20 @@ Panel window(const CaseLabels& labels, const Exercise& exercise) {
     return panel;
 }
 
+// The picture of the player in that window; white where there is none.
+Panel ultrasound_panel(const std::string& exercise,
+                       const std::map<std::string, std::vector<std::uint8_t>>& ultrasound) {
+    Panel panel;
+    const auto found = ultrasound.find(exercise);
+    if (found == ultrasound.end()) return panel;
+    const auto picture = grey_from_png(found->second);
+    if (!picture || picture->width_px != kPanelPx || picture->height_px != kPanelPx) return panel;
+    panel.caption = "ultrasound";
+    for (std::size_t n = 0; n < picture->pixels.size(); ++n)
+        std::fill_n(panel.rgb.begin() + 3 * static_cast<std::ptrdiff_t>(n), 3, picture->pixels[n]);
+    return panel;
+}
+
 void paste(const Panel& panel, int x0, int y0, int width, std::vector<std::uint8_t>& rgb) {
     for (int y = 0; y < kPanelPx; ++y)
         std::copy_n(panel.rgb.begin() + 3 * static_cast<std::ptrdiff_t>(y) * kPanelPx, 3 * kPanelPx,
@@ -182,7 +196,10 @@ void paste(const Panel& panel, int x0, int y0, int width, std::vector<std::uint8
 
 }  // namespace
 
-std::vector<std::uint8_t> case_sheet(const CaseBundle& bundle, const CheckResult& result) {
+std::vector<std::uint8_t> case_sheet(
+    const CaseBundle& bundle,
+    const CheckResult& result,
+    const std::map<std::string, std::vector<std::uint8_t>>& ultrasound) {
     const CaseLabels labels(bundle);
     const PatientAxes axes = axes_of(result);
     std::vector<Panel> panels = planes(labels, axes);
@@ -194,6 +211,7 @@ std::vector<std::uint8_t> case_sheet(const CaseBundle& bundle, const CheckResult
         if (!exercise || exercise->sweeps.empty() || exercise->sweeps.front().keys.empty())
             continue;
         panels.push_back(window(labels, *exercise));
+        if (!ultrasound.empty()) panels.push_back(ultrasound_panel(embedded.name, ultrasound));
     }
     const int rows = static_cast<int>((panels.size() + kColumns - 1) / kColumns);
     constexpr int kTitlePx = 44;

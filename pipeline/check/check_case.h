@@ -21,6 +21,7 @@
 //     not-valid        what `validate` refuses
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -76,8 +77,13 @@ std::string check_page(const CaseBundle& bundle,
 
 // One picture of the whole case as PNG: planes through the middle along the patient's axes with R
 // and L, views of organs and bones, and for each exercise the plane in which its first sweep
-// begins, with probe, needle and target. Cost: 0.5 s.
-std::vector<std::uint8_t> case_sheet(const CaseBundle& bundle, const CheckResult& result);
+// begins, with probe, needle and target, and beside it the ultrasound there. ultrasound: PNG of
+// kSheetPx by kSheetPx, by the exercises' names; of some or none. Cost: 0.5 s.
+inline constexpr int kSheetPx = 380;
+std::vector<std::uint8_t> case_sheet(
+    const CaseBundle& bundle,
+    const CheckResult& result,
+    const std::map<std::string, std::vector<std::uint8_t>>& ultrasound = {});
 
 // {"case", "faults": [{"name", "what", "remedy"}], "remarks", "organs", "targets", "exercises",
 // "ribs": {"right", "left"}}.

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <mutex>
 #include <string_view>
+#include <utility>
 
 #include "formats/exercise/exercise.h"
 #include "pipeline/base/parallel.h"
@@ -30,6 +31,7 @@ struct Template {
     const std::string_view* toml;
     double height;  // of the target in its structure: 0 towards the feet, 1 towards the head
     std::vector<std::string> also;  // structures that the exercise needs besides the target's
+    bool left = false;  // the text is of the right side and the exercise of the other one
 };
 
 const std::vector<Template>& templates() {
@@ -42,8 +44,39 @@ const std::vector<Template>& templates() {
         {"liver-biopsy-whole", &kLiverProcedureToml, 0.5, {}},
         {"nephrostomy", &kNephrostomyToml, 0.3, {}},
         {"femoral-line", &kFemoralLineToml, 0.1, {"iliac_artery_right"}},
+        {"kidney-access-left", &kKidneyAccessToml, 0.3, {}, true},
+        {"abscess-drainage-left", &kAbscessDrainageToml, 0.5, {}, true},
+        {"femoral-access-left", &kFemoralAccessToml, 0.1, {"iliac_artery_left"}, true},
+        {"compression-test-left", &kCompressionTestToml, 0.1, {}, true},
+        {"nephrostomy-left", &kNephrostomyToml, 0.3, {}, true},
+        {"femoral-line-left", &kFemoralLineToml, 0.1, {"iliac_artery_left"}, true},
     };
     return table;
+}
+
+bool is_letter(char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c & 0x80) != 0;
+}
+
+// The template's text; for the left side with the names of labels and the words of the left, and
+// the spleen in the liver's place among what is to be spared.
+std::string toml_of(const Template& from) {
+    std::string out(*from.toml);
+    if (!from.left) return out;
+    constexpr std::pair<std::string_view, std::string_view> kWords[] = {{"right", "left"},
+                                                                        {"rechten", "linken"},
+                                                                        {"rechte", "linke"},
+                                                                        {"liver", "spleen"},
+                                                                        {"Leber", "Milz"}};
+    for (const auto& [word, by] : kWords) {
+        for (std::size_t at = 0; (at = out.find(word, at)) != out.npos; at += by.size()) {
+            const std::size_t end = at + word.size();
+            if ((at > 0 && is_letter(out[at - 1])) || (end < out.size() && is_letter(out[end])))
+                continue;  // such as "bright"
+            out.replace(at, word.size(), by);
+        }
+    }
+    return out;
 }
 
 // Places of a label, and how far inside it they lie, mm, along the axes of the grid.
@@ -190,7 +223,8 @@ std::string with_places(const Template& from,
         "changed.\n";
     std::string table, held;  // held: comments, which belong to the line that follows them
     bool dropped = false;
-    std::string_view rest = *from.toml;
+    const std::string toml = toml_of(from);
+    std::string_view rest = toml;
     while (!rest.empty()) {
         const std::size_t end = std::min(rest.find('\n'), rest.size() - 1) + 1;
         const std::string_view line = rest.substr(0, end);
@@ -228,7 +262,7 @@ std::string with_places(const Template& from,
 
 // The exercise as its file has it; its frame is what a case on the patient's own skin has anyway.
 Result<Exercise> exercise_of(const Template& from) {
-    std::string read(*from.toml);
+    std::string read = toml_of(from);
     constexpr std::string_view kFrame = "frame = \"ct\"\n";
     if (const std::size_t at = read.find(kFrame); at != read.npos) read.erase(at, kFrame.size());
     return parse_exercise(read, from.name);

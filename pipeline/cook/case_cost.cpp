@@ -17,6 +17,7 @@
 #include "pipeline/registration/register_surfaces.h"
 #include "pipeline/segmentation/cooked_grid.h"
 #include "pipeline/segmentation/distance/label_distance.h"
+#include "pipeline/segmentation/label_field.h"
 #include "pipeline/segmentation/resample_labels.h"
 #include "pipeline/stages/import_stage.h"
 #include "pipeline/stages/mannequin_step.h"
@@ -107,6 +108,9 @@ CaseSize case_size(const Recipe& recipe) {
         const Grid grid = analytic_torso_grid({in.voxel_mm, in.voxel_mm, in.slice_mm}, in.body);
         voxels = static_cast<double>(grid.voxel_count());
         spacing_mm = grid.spacing_mm;
+        // Of a torso's organs, of tubes, and of a neck, whose map has much air.
+        const double for_a_million = in.body.tubes ? 0.14 : in.body.neck_seed != 0 ? 0.05 : 0.38;
+        size.sampling_s = for_a_million * voxels / 1e6;
     } else if (is_mesh_source(path)) {
         if (const auto grid = mesh_inputs_grid(recipe)) {
             voxels = static_cast<double>(grid->voxel_count());
@@ -134,9 +138,18 @@ CaseSize case_size(const Recipe& recipe) {
         seeks_label)
         if (auto labels = labels_of(recipe)) map = std::move(*labels);
     if (map) {
+        size.labels = static_cast<double>(map->labels.size());
         if (!recipe.inputs.analytic) spacing_mm = map->grid.spacing_mm;
         size.surfaces =
             surfaces_of(*map, node_spacing_mm(spacing_mm, size.interpolated_nodes, voxels));
+        // The map of an analytic body is coarser than the one that will be made.
+        if (!recipe.inputs.analytic) {
+            LabelFieldOptions field;
+            field.block = resample.block_vx;
+            const LabelFieldNeed need = LabelField::need(*map, field);
+            size.held_mb = need.held_mb;
+            size.measured_mb = need.measured_mb;
+        }
     } else {
         size.surfaces = CaseSize::kTorsoSurfaces * std::cbrt(size.nodes() * size.nodes());
     }
@@ -202,16 +215,24 @@ Status check_memory(const MemoryNeed& need, double limit_mb) {
 
 namespace {
 
-// Relative least squares over demo-torso and real-torso at six voxel sizes, two threads, on a
-// machine that others used as well; the term in the label map is that of 88 and 210 million voxels
-// (docs/farm.md).
-constexpr double kFixedS = 5.53, kTextureS = 1.25, kVolumeS = 0.1003, kSurfaceS = 0.5727,
-                 kLabelsS = 0.52, kLabelsWithin = 3;
-// Resampling holds a map of more voxels in 16-bit numbers, which takes less for each.
-constexpr double kLargeS = 0.4, kLargeFrom = 30;
-// What organ meshes take before they are voxels, and for a million of these; the fit, which a known
-// map does without; and one refit to half of the readings, without an elastic warp.
-constexpr double kMendS = 3.3, kMeshS = 0.28, kFitS = 2.3, kRefitS = 0.27;
+// Relative least squares over demo-torso and real-torso at six voxel sizes on a machine that others
+// used as well, and necks, phantoms, torsos and CTs of 8 to 68 labels, each over its own
+// machine_speed(). For a label, of its texture and of the rest (its pieces, its volume, its place
+// in the tree of unions); for a million cooked voxels and what goes with their surface; for a
+// million faces of the map.
+constexpr double kLabelS = 0.041, kTextureS = 0.0227, kVolumeS = 0.1226, kSurfaceS = 0.473,
+                 kRegionS = 0.1003, kFaceS = 1.26;
+// For a million nodes between thick slices, beyond some.
+constexpr double kBetweenS = 0.38, kBetweenFrom = 4;
+// A map from a file, for a million voxels beyond some; the term is that of 88 and 210 million
+// (docs/farm.md). Resampling holds a map of more voxels in 16-bit numbers, which takes less for
+// each.
+constexpr double kLabelsS = 0.2, kLabelsWithin = 3, kLargeS = 0.41, kLargeFrom = 30;
+// The fit, and one refit to half of the readings. Organ meshes: what they take before they are
+// voxels, and for a million of these; and the elastic warp, which another body's mannequin needs,
+// in the fit and in each refit.
+constexpr double kFitS = 2.2, kRefitS = 0.27, kMendS = 3.3, kMeshS = 0.28, kElasticS = 3.5,
+                 kElasticRefitS = 0.5;
 // For a million cooked voxels, a lesion and a pool of free fluid, which is sought in all of its
 // host: 1, 4 and 16 in the demo torso, three of them pools, at 1.5 and 1 mm.
 constexpr double kLesionS = 0.0112, kPoolS = 0.134;
@@ -234,15 +255,19 @@ double probe_processor_seconds() {
 
 BuildTime build_time(const CaseSize& size, int texture_edge, double speed, int threads) {
     const double cooked = size.cooked_voxels,
-                 mapped = size.label_voxels * std::min(1.0, size.surface_share());
+                 mapped = size.sampling_s > 0 || size.mesh_voxels > 0
+                              ? 0
+                              : size.label_voxels * std::min(1.0, size.surface_share());
     BuildTime time;
     time.processor_s =
-        speed * (kFixedS + kTextureS * std::pow(texture_edge / 64.0, 3) +
-                 kVolumeS * (cooked + size.region_voxels) + kSurfaceS * std::cbrt(cooked * cooked) +
+        speed * (kFitS + (kLabelS + kTextureS * std::pow(texture_edge / 64.0, 3)) * size.labels +
+                 kVolumeS * cooked + kRegionS * size.region_voxels +
+                 kSurfaceS * std::cbrt(cooked * cooked) + kFaceS * size.surfaces +
+                 kBetweenS * std::max(0.0, size.interpolated_nodes - kBetweenFrom) +
                  kLabelsS * std::clamp(mapped - kLabelsWithin, 0.0, kLargeFrom - kLabelsWithin) +
-                 kLargeS * std::max(0.0, mapped - kLargeFrom) +
+                 kLargeS * std::max(0.0, mapped - kLargeFrom) + size.sampling_s +
                  (kLesionS * size.lesions + kPoolS * size.pools) * cooked +
-                 (size.mesh_voxels > 0 ? kMendS : 0) + kMeshS * size.mesh_voxels);
+                 (size.mesh_voxels > 0 ? kMendS + kElasticS : 0) + kMeshS * size.mesh_voxels);
     const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
     const double serial = std::min(time.processor_s, speed * (kSerialS + kSerialVolumeS * cooked));
     const int shared_by = threads > 0 ? std::min(threads, cores) : cores;
@@ -258,9 +283,11 @@ BuildTime build_time(
     BuildTime time =
         build_time(now, recipe.settings.of<TextureStageOptions>().bank.edge, speed, threads);
     const RegisterOptions& fit = recipe.settings.of<RegisterOptions>();
-    const bool known = recipe.inputs.analytic && recipe.inputs.torso.known_map;
-    const double more_s = speed * (known                     ? -kFitS
-                                   : fit.uncertainty == "on" ? kRefitS * fit.refits
+    const bool fitted =
+        !recipe.inputs.own_skin && !(recipe.inputs.analytic && recipe.inputs.torso.known_map);
+    const double refit_s = kRefitS + (size.mesh_voxels > 0 ? kElasticRefitS : 0);
+    const double more_s = speed * (!fitted                   ? -kFitS
+                                   : fit.uncertainty == "on" ? refit_s * fit.refits
                                                              : 0);
     const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
     time.processor_s += more_s;

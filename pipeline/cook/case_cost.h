@@ -43,13 +43,15 @@ struct BuildTime {
     double alone_s = 0;      // by the clock, on a machine with nothing else to do
 };
 
-// Estimates the time by a law fitted to builds of two cases (docs/accuracy.md has the table):
-//     processor_s = speed * (a + t (edge / 64)^3 + b (C + R) + c C^(2/3) + d (V - 3) + m M
-//                            + (l L + p P) C)
-// C, R, V, M millions of voxels, cooked, of the region, of the label map (V counts where it exceeds
-// 3, and less beyond 30) and of a map that organ meshes become; edge of the textures; L lesions, P
-// pools of free fluid. A fit that needs the elastic warp takes some 3 s more, which is not known
-// beforehand.
+// Estimates the time by a law fitted to 29 builds (docs/farm.md has the table):
+//     processor_s = speed * (f + (s + t (edge / 64)^3) L + b C + r R + c C^(2/3) + d F + e (K - 4)
+//                            + p + m M + (l N + q P) C)
+// L number of labels; C, R, M millions of voxels, cooked, of the region, and of a map that organ
+// meshes become; F millions of faces between labels, K of nodes between thick slices where they are
+// more than 4; edge of the textures; p what it takes to read the map, or to sample an analytic
+// body; N lesions, P pools of free fluid; f the fit, which a known map and the patient's own skin
+// do without. A fit that needs the elastic warp takes some 3 s more, which is not known beforehand
+// but of organ meshes, whose mannequin is another body's.
 //
 // speed: machine_speed(); threads: 0 for all cores.
 BuildTime build_time(const CaseSize& size, int texture_edge, double speed, int threads);

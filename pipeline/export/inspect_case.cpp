@@ -17,6 +17,7 @@
 #include "formats/flow/flow_summary.h"
 #include "formats/volume/boundary_record.h"
 #include "formats/volume/tissue.h"
+#include "pipeline/export/author_key.h"
 
 namespace sonocase::pipeline::inline exporting {
 
@@ -313,6 +314,14 @@ std::string inspection_json(const CaseBundle& bundle, const Inspection& inspecti
     json["has"] = {{"boundary", !bundle.boundary.table.empty()},
                    {"echo_offset", !bundle.echo_offset.table.empty()},
                    {"speckle_edge", bundle.speckle.edge}};
+    const CaseSignature& by = inspection.signature;
+    json["signature"] = nullptr;
+    if (by.fit != SignatureFit::none)
+        json["signature"] = {{"fit", by.fit == SignatureFit::fits      ? "fits"
+                                     : by.fit == SignatureFit::differs ? "differs"
+                                                                       : "unreadable"},
+                             {"name", by.name},
+                             {"fingerprint", fingerprint_of(by.key)}};
     return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
@@ -326,6 +335,8 @@ std::string inspection_text(const CaseBundle& bundle, const Inspection& inspecti
     text += line("  made by    %s", bundle.manifest.producer.c_str());
     if (const std::string from = attribution_of(bundle); !from.empty())
         text += "  from       " + from + "\n";
+    if (const std::string by = signature_words(inspection.signature); !by.empty())
+        text += "  signature  " + by + "\n";
     text += line("  grid       %d x %d x %d voxels of %g mm, origin (%.1f, %.1f, %.1f) mm",
                  grid.size.x, grid.size.y, grid.size.z, grid.spacing_mm.x, grid.origin_mm.x,
                  grid.origin_mm.y, grid.origin_mm.z);

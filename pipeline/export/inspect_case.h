@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "formats/bundle/case_bundle.h"
+#include "formats/bundle/signature.h"
 #include "pipeline/export/error_budget.h"
 
 namespace sonocase::pipeline::inline exporting {
@@ -30,6 +31,7 @@ struct Inspection {
     std::size_t bytes = 0;
     std::vector<double> seconds;  // see recorded_seconds
     NextStep next;
+    CaseSignature signature;
 };
 
 // {"case", "producer", "bytes", "digest", "grid": {"size", "voxel_mm", "origin_mm"}, "region":
@@ -39,7 +41,8 @@ struct Inspection {
 // "seconds", "errors": {measure: value}, "warnings"}], "error_budget": {"entries": [{"stage",
 // "cause", "mm" or null, "basis"}], "known_mm", "next": null or {"step", "error_from_mm",
 // "error_to_mm", "more_seconds"}}, "unknown": [{"label", "p90_mm", "with_two_landmarks_mm" where it
-// is known}] worst first, "exercises", "inputs", "surfaces", "textures", "has"}.
+// is known}] worst first, "exercises", "inputs", "surfaces", "textures", "has", "signature": null
+// or {"fit": "fits", "differs" or "unreadable", "name", "fingerprint"}}.
 std::string inspection_json(const CaseBundle& bundle, const Inspection& inspection);
 std::string inspection_text(const CaseBundle& bundle, const Inspection& inspection);
 

@@ -17,8 +17,8 @@
 #include "formats/text/json_reader.h"
 #include "formats/text/nearest_name.h"
 #include "formats/text/toml_reader.h"
-#include "pipeline/base/program_beside.h"
 #include "pipeline/export/course_package.h"
+#include "pipeline/export/ultrasound_picture.h"
 
 namespace sonocase::pipeline::inline exporting {
 namespace {
@@ -208,24 +208,6 @@ Result<std::string> other_hosts(const PublishOptions& options) {
     return out;
 }
 
-std::string quoted(const std::string& text) {
-    std::string out = "'";
-    for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    return out + "'";
-}
-
-// The case's cover as the window draws it: PNG of the ultrasound at the start of the first
-// exercise.
-Result<std::vector<std::uint8_t>> cover_of(const std::string& path) {
-    TemporaryFolder folder;
-    SONOCASE_TRY_DONE(folder.make("sonocase-cover"));
-    const std::string arguments = quoted(path) +
-                                  " --headless --frames 1 --tracker mouse --size 416x260 --out " +
-                                  quoted(folder.path()) + " 2>&1";
-    SONOCASE_TRY_DONE(output_of_program_beside("sonoplay", arguments, "install the player"));
-    return read_file(folder.path() + "/frame_00000.png");
-}
-
 // warnings: of covers that could not be drawn, whose cases keep their bundle's slices.
 Result<std::vector<ReadCase>> read_cases(const std::vector<std::string>& paths,
                                          std::vector<std::string>& warnings) {
@@ -237,7 +219,8 @@ Result<std::vector<ReadCase>> read_cases(const std::vector<std::string>& paths,
         if (!names.insert(read.site.name).second) {
             return Error{"two cases are named " + read.site.name, path, "rename one of the files"};
         }
-        auto cover = cover_of(path);
+        // As the window draws it: the start of the first exercise.
+        auto cover = ultrasound_png(path, {});
         if (cover) {
             read.site.preview = std::move(*cover);
         } else {
@@ -397,10 +380,9 @@ Result<std::vector<SiteFile>> files_of(const SiteParts& site, const std::string&
             name.starts_with("words-") && name.ends_with(".json"))
             names.push_back(name);
     std::sort(names.begin(), names.end());
-    // A page that was built without its camera says so itself.
-    if (fs::exists(site.program + "/camera.wasm", failed))
-        for (const char* name : {"camera.js", "camera_worker.js", "camera.wasm"})
-            names.push_back(name);
+    // Those of trackers. A page that was built without its camera says so itself.
+    for (const char* name : {"camera.js", "camera_worker.js", "camera.wasm", "usb.js", "usb.wasm"})
+        if (fs::exists(site.program + "/" + name, failed)) names.push_back(name);
     if (site.course) {
         out.push_back(site.course->file);
         names.push_back("course.js");

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <optional>
 
 #include "formats/base/digest.h"
 #include "formats/bundle/case_bundle.h"
+#include "formats/exercise/exercise.h"
 #include "formats/files/atomic_file.h"
 #include "formats/files/load_save.h"
 #include "formats/files/thread_jobs.h"
@@ -16,6 +18,7 @@
 #include "pipeline/check/propose_exercises.h"
 #include "pipeline/cook/cook_case.h"
 #include "pipeline/cook/input_digests.h"
+#include "pipeline/export/ultrasound_picture.h"
 #include "pipeline/make/make_plan.h"
 #include "pipeline/stages/read_recipe.h"
 #include "pipeline/stages/roles.h"
@@ -27,7 +30,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kProposalsVersion = 1, kCheckVersion = 1;  // raised when they come out otherwise
+constexpr int kProposalsVersion = 2, kCheckVersion = 2;  // raised when they come out otherwise
 
 // Where the whole stands when its parts begin: shares of the time on the shared CT.
 constexpr double kCookAt = 0.02, kProposeAt = 0.55, kCookAgainAt = 0.72, kCheckAt = 0.84,
@@ -255,8 +258,10 @@ class Maker {
         SONOCASE_TRY_DONE(
             write_file(folder_.file("check.html"), std::string_view(check_page(*bundle_, result))));
         report_progress(progress_, kDrawAt, "drawing pictures");
-        SONOCASE_TRY_DONE(write_file(folder_.file("pictures.png"),
-                                     std::span<const std::uint8_t>(case_sheet(*bundle_, result))));
+        const std::vector<std::uint8_t> sheet =
+            case_sheet(*bundle_, result, ultrasound_of_exercises());
+        SONOCASE_TRY_DONE(
+            write_file(folder_.file("pictures.png"), std::span<const std::uint8_t>(sheet)));
         for (const Fault& fault : result.faults)
             made_.faults.push_back(fault.name + ": " + fault.what + "; " + fault.remedy);
         made_.checked_anew = true;
@@ -265,6 +270,31 @@ class Maker {
                             n < made_.faults.size() ? made_.faults[n] : "");
         folder_.set_key("check", key);
         return Done{};
+    }
+
+    // What the player shows where each exercise's first sweep begins, for the sheet.
+    std::map<std::string, std::vector<std::uint8_t>> ultrasound_of_exercises() {
+        std::map<std::string, std::vector<std::uint8_t>> pictures;
+        const std::size_t count = bundle_->exercises.size();
+        for (std::size_t n = 0; n < count; ++n) {
+            const EmbeddedExercise& embedded = bundle_->exercises[n];
+            const auto exercise = parse_exercise(embedded.toml, embedded.name);
+            if (!exercise || exercise->sweeps.empty()) continue;
+            report_progress(progress_,
+                            kDrawAt + (kPublishAt - kDrawAt) * static_cast<double>(n) /
+                                          static_cast<double>(count),
+                            "drawing pictures");
+            auto picture = ultrasound_png(
+                options_.out,
+                {embedded.name, "sweep:" + exercise->sweeps.front().name, kSheetPx, kSheetPx});
+            if (!picture) {
+                made_.warnings.push_back("pictures.png shows no ultrasound: " +
+                                         picture.error().message());
+                return {};
+            }
+            pictures[embedded.name] = std::move(*picture);
+        }
+        return pictures;
     }
 
     Status refuse_faults() const {

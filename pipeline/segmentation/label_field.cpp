@@ -46,8 +46,39 @@ std::pair<Int3, Int3> voxels_near(Int3 first, int block, Int3 size, int factor) 
 LabelField::LabelField(const LabelVolume& labels,
                        const LabelFieldOptions& options,
                        const Progress& progress)
-    : distance_(labels, options.distance), nodes_(distance_.nodes()) {
+    : LabelField(labels, options, Unmeasured{}) {
     report_progress(progress, 0, "distances");
+    hold(0, 0);
+}
+
+LabelFieldNeed LabelField::need(const LabelVolume& labels, const LabelFieldOptions& options) {
+    const LabelField field(labels, options, Unmeasured{});
+    constexpr double kScratchBytes = 26;
+    const double phi = static_cast<double>(field.phi_) / 1e6,
+                 bytes = field.step_mm_ > 0 ? sizeof(std::int16_t) : sizeof(float);
+    struct Thread {
+        std::size_t nodes = 0;  // of the largest piece so far
+        double numbers = 0;
+    };
+    std::array<Thread, 2> threads;
+    LabelFieldNeed need;
+    for (std::size_t p = 0; p < field.pieces_.size(); ++p) {
+        const Piece& piece = field.pieces_[p];
+        Thread& thread = threads[p % 2];
+        const double numbers = static_cast<double>(piece.blocks.size()) * phi;
+        if (piece.part.count() < thread.nodes / 2) thread = {};
+        thread.nodes = std::max(thread.nodes, piece.part.count());
+        thread.numbers = std::max(thread.numbers, numbers);
+        need.measured_mb =
+            std::max(need.measured_mb,
+                     need.held_mb + kScratchBytes * (threads[0].numbers + threads[1].numbers));
+        need.held_mb += bytes * numbers;
+    }
+    return need;
+}
+
+LabelField::LabelField(const LabelVolume& labels, const LabelFieldOptions& options, Unmeasured)
+    : distance_(labels, options.distance), nodes_(distance_.nodes()) {
     tree_ = nest_labels(source());
     volume_offsets_mm_.assign(label_count(), 0.0f);
     const bool many = nodes_.voxel_count() > options.max_float_nodes;
@@ -74,7 +105,6 @@ LabelField::LabelField(const LabelVolume& labels,
         }
     });
     list_pieces();
-    hold(0, 0);
 }
 
 // For each block, the labels with an outline that crosses it on its way from slice to slice.

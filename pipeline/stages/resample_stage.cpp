@@ -203,9 +203,11 @@ std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests&) {
          region->size_mm.x, region->size_mm.y, region->size_mm.z, region->margin_mm})};
 }
 
-// Memory goes by surfaces, since distances are held near them alone. Two threads measure the
-// distances to two unions of labels, each on its box, or on parts of it where it has more than ten
-// million nodes (label_field.cpp); then voxels are sampled.
+// Memory goes by surfaces, since distances are held near them alone. Where the map could be read,
+// the field's own plan says how much is held and measured (LabelField::need); then candidates are
+// listed beside them, and voxels sampled. Else by faces, of the map or of a torso: two threads
+// measure the distances to two unions of labels, each on its box, or on parts of it where it has
+// more than ten million nodes (label_field.cpp).
 double more_mb(const CaseSize& size, bool least) {
     constexpr double kLarge = 30;  // million nodes from which distances are 16-bit numbers
     constexpr double kHeld = 250, kMeasured = 415;  // for a million faces
@@ -214,14 +216,21 @@ double more_mb(const CaseSize& size, bool least) {
     // Of thick slices, for a node of the box of the body: numbers of every node, not of those near
     // a surface alone.
     constexpr double kDense = 18, kDenseNodes = 7.5;
-    const double cooked_mb = 3 * size.cooked_voxels, nodes = size.nodes();
+    // Candidates, for what is held; a node's label and margin; a cooked voxel and its records.
+    constexpr double kCandidates = 0.25, kNode = 2, kCooked = 2.5;
+    const double nodes = size.nodes();
     if (nodes > kLarge)
         return std::min(1.0, size.surface_share()) * (505 + (least ? 8 : 12) * size.label_voxels) +
-               cooked_mb;
-    const double held_mb = kHeld * size.surfaces,
-                 measured_mb = kMeasured * size.surfaces * (nodes > kWhole ? kInParts : 1) +
-                               kDense * std::min(kDenseNodes, size.interpolated_nodes);
-    return 2 * size.label_voxels + held_mb + std::max(measured_mb, 2 * nodes + cooked_mb);
+               3 * size.cooked_voxels;
+    const double dense_mb = kDense * std::min(kDenseNodes, size.interpolated_nodes);
+    if (size.held_mb > 0)
+        return 2 * size.label_voxels + std::max(size.measured_mb + dense_mb,
+                                                (1 + kCandidates) * size.held_mb + kNode * nodes +
+                                                    kCooked * size.cooked_voxels);
+    const double measured_mb =
+        kMeasured * size.surfaces * (nodes > kWhole ? kInParts : 1) + dense_mb;
+    return 2 * size.label_voxels + kHeld * size.surfaces +
+           std::max(measured_mb, kNode * nodes + 3 * size.cooked_voxels);
 }
 
 StageVerb verb() {

@@ -41,6 +41,8 @@ const std::vector<Verb>& hand_written_verbs() {
         {kCase, "check", "look a case over before it teaches", verb_check, ""},
         {kCase, "aim", "find windows on the skin for a target", verb_aim, ""},
         {kCase, "export", "unpack a bundle for other tools", verb_export, ""},
+        {kCase, "key", "make an author's key, to sign cases with", verb_key, ""},
+        {kCase, "sign", "put the author's signature into a case", verb_sign, ""},
         {kCase, "publish", "write a site that plays cases in browsers", verb_publish, ""},
         {kCase, "look", "measure how a real machine draws", verb_look, ""},
         {kCase, "tradeoff", "sweep accuracy against time", verb_tradeoff, ""},

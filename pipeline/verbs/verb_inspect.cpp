@@ -10,6 +10,7 @@
 #include "formats/files/load_save.h"
 #include "formats/files/thread_jobs.h"
 #include "pipeline/export/accuracy_picture.h"
+#include "pipeline/export/author_key.h"
 #include "pipeline/export/inspect_case.h"
 #include "pipeline/tradeoff/choose_settings.h"
 #include "pipeline/verbs/verb_common.h"
@@ -17,12 +18,22 @@
 
 namespace sonocase::pipeline::inline verbs {
 
+namespace {
+
+Result<PublicKey> public_key_from(const std::string& path) {
+    SONOCASE_TRY(const auto text, read_text_file(path));
+    return parse_public_key(text, path);
+}
+
+}  // namespace
+
 int verb_inspect(int argc, char** argv) {
     CLI::App app(
         "Show what a bundle holds: grid, labels, tissues, errors and seconds of each stage");
     std::string path;
     bool json = false, accuracy = false;
     std::string picture;
+    std::string signed_by;
     CommonOptions common;
     app.add_option("BUNDLE", path, "The bundle")->required();
     auto* as_json = app.add_flag("--json", json, "As JSON, in the documented form");
@@ -32,6 +43,9 @@ int verb_inspect(int argc, char** argv) {
         ->excludes(as_json);
     app.add_option("--picture", picture, "Draw that accuracy into FILE.svg or FILE.png")
         ->type_name("FILE");
+    app.add_option("--signed-by", signed_by,
+                   "Fail unless the case is as the holder of this key left it")
+        ->type_name("KEY.pub");
     add_common_options(app, common);
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
     auto bytes = read_file(path);
@@ -39,7 +53,17 @@ int verb_inspect(int argc, char** argv) {
     ThreadJobs jobs(common.threads);
     auto bundle = read_bundle(*bytes, path, jobs);
     if (!bundle) return fail("inspect", bundle.error());
-    Inspection inspection{path, digest_of(*bytes), bytes->size(), {}, {}};
+    Inspection inspection{path, digest_of(*bytes), bytes->size(), {}, {}, signature_of(*bytes)};
+    if (!signed_by.empty()) {
+        const auto key = public_key_from(signed_by);
+        if (!key) return fail("inspect", key.error());
+        const CaseSignature& found = inspection.signature;
+        const std::string words = signature_words(found);
+        if (found.fit != SignatureFit::fits || found.key != *key)
+            return fail("inspect", {words.empty() ? "is not signed" : words, path,
+                                    "expected the signature of the key with fingerprint " +
+                                        fingerprint_of(*key)});
+    }
     inspection.seconds = recorded_seconds(*bundle, path, inspection.digest);
     const Vector3 extent = bundle->grid.bounds().extent();
     const double volume_mm3 = extent.x * extent.y * extent.z;

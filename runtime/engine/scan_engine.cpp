@@ -11,13 +11,6 @@
 namespace sonocase::runtime::inline engine {
 namespace {
 
-const SensorReading* sensor(const TrackerReading& reading, int index) {
-    if (index < 0 || index >= reading.sensor_count || index >= kMaxSensors) return nullptr;
-    const SensorReading& s = reading.sensors[index];
-    const bool ok = s.state == SensorState::ok || s.state == SensorState::poor;
-    return ok && is_finite(s.world_from_sensor) ? &s : nullptr;
-}
-
 bool is_pose(const SensorReading& s) {
     return s.state == SensorState::ok || s.state == SensorState::poor;
 }
@@ -46,54 +39,6 @@ bool another_moved(const TrackerReading& reading, const TrackerReading& before, 
 }
 
 }  // namespace
-
-SensorAssignment places_of(const TrackerReading& reading, const SensorAssignment& assignment) {
-    return reading.in_mannequin || reading.placed ? SensorAssignment{} : assignment;
-}
-
-std::optional<Rigid> sensor_pose(const TrackerReading& reading,
-                                 const SensorAssignment& assignment,
-                                 int index) {
-    constexpr double kReferenceS = 0.25;  // as long as a tool may be silent
-    const SensorReading* s = sensor(reading, index);
-    if (!s) return {};
-    if (assignment.reference < 0 || reading.in_mannequin || s->in_mannequin || s->in_reference)
-        return s->world_from_sensor;
-    const SensorReading* reference = sensor(reading, assignment.reference);
-    if (!reference) return {};
-    if (reference->time_s >= 0 && reading.time_s - reference->time_s > kReferenceS) return {};
-    return inverse(reference->world_from_sensor) * s->world_from_sensor;
-}
-
-ToolPoses tool_poses(const TrackerReading& reading,
-                     const Calibrations& calibrations,
-                     const SensorAssignment& assignment) {
-    const SensorAssignment places = places_of(reading, assignment);
-    const auto place = [&](const Rigid& world_from_sensor, bool in_mannequin,
-                           const std::optional<Calibration>& tool) {
-        if (reading.in_mannequin || in_mannequin) return world_from_sensor;
-        Rigid world_from_tool = world_from_sensor;
-        if (tool) world_from_tool = world_from_tool * tool->sensor_from_tool;
-        if (!calibrations.mannequin) return world_from_tool;
-        Rigid pose = inverse(calibrations.mannequin->sensor_from_tool) * world_from_tool;
-        if (calibrations.mannequin->scale > 0) {
-            pose.translation = pose.translation / calibrations.mannequin->scale;
-        }
-        return pose;
-    };
-    ToolPoses tools;
-    if (const auto pose = sensor_pose(reading, places, places.probe)) {
-        tools.has_probe = true;
-        tools.mannequin_from_probe =
-            place(*pose, reading.sensors[places.probe].in_mannequin, calibrations.probe);
-    }
-    if (const auto pose = sensor_pose(reading, places, places.needle)) {
-        tools.has_needle = true;
-        tools.mannequin_from_needle =
-            place(*pose, reading.sensors[places.needle].in_mannequin, calibrations.needle);
-    }
-    return tools;
-}
 
 bool probe_in_contact(const Skin& skin, const Probe& probe, const Rigid& mannequin_from_probe) {
     constexpr double kGelMm = 4;
@@ -197,7 +142,7 @@ FrameStatus ScanEngine::frame(double now_s,
     const SensorAssignment places = places_of(reading_, assignment_);
     const auto lost = [&](const SensorWatch& watch, int index) {
         // Only a tool whose pose depends on the reference is lost with it.
-        const SensorReading* s = sensor(reading_, index);
+        const SensorReading* s = sensor_with_pose(reading_, index);
         const bool depends = places.reference >= 0 && s && !s->in_mannequin && !s->in_reference;
         return watch.lost(now_s) || (depends && reference_watch_.lost(now_s));
     };

@@ -56,6 +56,9 @@ struct ToolPoses {
     double probe_age_s = 0, needle_age_s = 0;
 };
 
+// A sensor that has a pose; null: it is absent or lost, or its pose is not a number.
+const SensorReading* sensor_with_pose(const TrackerReading& reading, int index);
+
 // The pose of a sensor as calibrations mean it: relative to the reference where there is one,
 // unless the sensor's own pose is in `mannequin`. Nothing for a sensor that is absent or lost,
 // whose pose is not a number, or whose reference is so or came more than 0.25 s before. Constant

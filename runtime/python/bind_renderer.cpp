@@ -200,7 +200,7 @@ class PyRenderer {
         task.pixels = {picture.data, static_cast<std::size_t>(width() * height())};
         const Turn turn(busy_);
         FrameRenderer& renderer = inner();
-        refuse_metres(task.input.mannequin_from_probe, "pose");
+        refuse_metres(task.input, "pose", "needle");
         {
             const py::gil_scoped_release free_to_run;
             renderer.render(task);
@@ -275,7 +275,8 @@ class PyRenderer {
         const Turn turn(busy_);
         FrameRenderer& renderer = inner();
         for (std::size_t n = 0; n < tasks.size(); ++n)
-            refuse_metres(tasks[n].input.mannequin_from_probe, "poses[" + std::to_string(n) + "]");
+            refuse_metres(tasks[n].input, "poses[" + std::to_string(n) + "]",
+                          "needles[" + std::to_string(n) + "]");
         std::optional<Result<bool>> whole;
         {
             const py::gil_scoped_release free_to_run;
@@ -311,22 +312,32 @@ class PyRenderer {
 
   private:
     // A pose in metres puts the face within 2 mm of the frame's origin, where a face in millimetres
-    // lies only if the skin does.
-    void refuse_metres(const Rigid& pose, const std::string& name) const {
-        const double far_mm = norm(pose.translation);
-        if (!(far_mm > 0 && far_mm < 2)) return;
-        const runtime::Skin skin(*inner().opened().bundle);
-        if (norm(skin.normal(Point3{} + pose.translation, kSkinRadiusMm)) > 0) return;
-        throw py::value_error(name +
-                              ": a translation of less than 2 mm, far from the skin; give it in "
-                              "millimetres, not in metres");
+    // lies only if the skin does. A needle's tip may well lie there: in metres it is one that a
+    // thousand times as much brings nearer to the probe.
+    void refuse_metres(const runtime::FrameInput& input,
+                       const std::string& pose,
+                       const std::string& needle) const {
+        const Vector3 face = input.mannequin_from_probe.translation;
+        const auto near_origin = [](Vector3 v) { return norm(v) > 0 && norm(v) < 2; };
+        if (near_origin(face)) {
+            const runtime::Skin skin(*inner().opened().bundle);
+            if (!(norm(skin.normal(Point3{} + face, kSkinRadiusMm)) > 0))
+                throw py::value_error(pose +
+                                      ": a translation of less than 2 mm, far from the skin; "
+                                      "give it in millimetres, not in metres");
+        }
+        const Vector3 tip = input.needle.tip - Point3{};
+        if (input.has_needle && near_origin(tip) && norm(1000 * tip - face) < norm(tip - face))
+            throw py::value_error(needle +
+                                  ": a tip less than 2 mm from the frame's origin, far from the "
+                                  "probe; give it in millimetres, not in metres");
     }
 
     py::object render_doppler(FrameTask& task, const py::dict& given, const py::object& out) {
         runtime::DopplerSettings& settings = task.input.settings.doppler;
         const Turn turn(busy_);
         FrameRenderer& renderer = inner();
-        refuse_metres(task.input.mannequin_from_probe, "pose");
+        refuse_metres(task.input, "pose", "needle");
         check(renderer.prepare_doppler());
         apply_doppler(given, settings);
         const runtime::DopplerSettings aim =

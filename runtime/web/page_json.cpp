@@ -75,6 +75,15 @@ Json json_of_exercise(const CaseBundle& bundle, const Exercise& exercise) {
 
 }  // namespace
 
+std::string signature_json(const CaseSignature& signature) {
+    static constexpr const char* kFits[] = {"none", "fits", "differs", "unreadable"};
+    Json out = Json::object();
+    out["fit"] = kFits[static_cast<std::size_t>(signature.fit)];
+    out["name"] = signature.name;
+    out["fingerprint"] = fingerprint_of(signature.key);
+    return detail::json_text(out, false);
+}
+
 std::string case_json(const PagePlayer& player) {
     Json out = Json::object();
     out["case_name"] = player.bundle()->manifest.case_name;
@@ -138,6 +147,13 @@ std::string result_json(const SessionScore& score) {
                              {"none", !row.at_least && row.limit == 0},
                              {"limit", metric_words(row.metric, row.limit)},
                              {"reached", row.reached}}));
+    out["trend"] = nullptr;
+    if (!result.trend_metric.empty()) {
+        const ResultRow& row = result.rows.front();
+        out["trend"] = Json({{"metric", row.metric},
+                             {"title", row.title},
+                             {"limit", row.has_limit ? Json(row.limit) : Json(nullptr)}});
+    }
     for (const Metric& metric : score.metrics) {
         const MetricInfo* info = find_metric(metric.name);
         if (!info || !std::isfinite(metric.value)) continue;

@@ -20,13 +20,17 @@ namespace sonocase::runtime::inline web {
 // "number"}], "warnings": [texts]}; a limit that does not exist is null.
 std::string case_json(const PagePlayer& player);
 
+// {"fit": "none", "fits", "differs" or "unreadable", "name", "fingerprint"}.
+std::string signature_json(const CaseSignature& signature);
+
 // [{"name", "title", "unit"}] of every score, in the order of metric_table().
 std::string metric_words_json();
 
 // The page after an attempt (attempt_result.h): {"has_marks", "passed", "marks", "marks_reached",
-// "advice", "rows": [{"title", "value", "measured", "has_limit", "at_least", "none", "limit",
-// "reached"}], "measures": [{"title", "value", "evidence"}] of all that were measured}. Values and
-// limits are words; "none": the limit is an upper one of 0.
+// "advice", "trend": null or {"metric", "title", "limit"} of the first row, "rows": [{"title",
+// "value", "measured", "has_limit", "at_least", "none", "limit", "reached"}], "measures":
+// [{"title", "value", "evidence"}] of all that were measured}. Values and limits of rows are words;
+// "none": the limit is an upper one of 0.
 std::string result_json(const SessionScore& score);
 
 // {"step", "steps", "title", "words"}; step is kGuideSteps when all are done.

@@ -149,6 +149,8 @@ ScanGeometry doppler_geometry(const ScanEngine& engine) {
 
 namespace {
 
+constexpr double kAttemptStepS = 0.1;  // between the kept pictures of an attempt
+constexpr std::size_t kAttemptMost = 3000;
 constexpr double kKeptSeconds = 20;
 constexpr double kKeptRate = 60;  // pictures per second that are kept
 
@@ -211,6 +213,12 @@ std::vector<SegmentRun> PagePlayer::next_runs(std::size_t max_segments) {
                       max_segments);
 }
 
+const CaseSignature* PagePlayer::check_signature() {
+    if (!is_whole()) return nullptr;
+    if (!signature_) signature_.emplace(bundle_.bytes());
+    return signature_->step() ? &signature_->result() : nullptr;
+}
+
 Status PagePlayer::choose_exercise(int index, int side_px) {
     const int count = static_cast<int>(exercises_.size());
     const int wanted = (index % count + count) % count;
@@ -231,6 +239,8 @@ Status PagePlayer::choose_exercise(int index, int side_px) {
     }
     session_.reset();
     watched_.reset();
+    attempt_kept_.clear();
+    looks_at_attempt_ = false;
     hands_ = std::make_unique<MouseTracker>(Skin(*bundle_), exercise);
     return Done{};
 }
@@ -293,6 +303,13 @@ FrameStatus PagePlayer::frame(double now_s, const ImageSettings& settings) {
     FrameRecord record = engine_->last();
     doppler_.frame(*engine_, record, pixels_, true);
     record.doppler = doppler_.report();
+    keep(record, now_s);
+    if (session_) session_->observe(record);
+    return status;
+}
+
+void PagePlayer::keep(const FrameRecord& record, double now_s) {
+    looks_at_attempt_ = false;
     // A session's clock starts over, so that time may fall.
     if (kept_last_s_ < 0 || now_s < kept_last_s_ || now_s - kept_last_s_ >= 0.98 / kKeptRate) {
         kept_[kept_next_] = record;
@@ -300,19 +317,38 @@ FrameStatus PagePlayer::frame(double now_s, const ImageSettings& settings) {
         kept_count_ = std::min(kept_count_ + 1, kept_.size());
         kept_last_s_ = now_s;
     }
-    if (session_) session_->observe(record);
-    return status;
+    if (!session_) return;
+    const double time_s = record.input.time_s;
+    if (!attempt_kept_.empty() &&
+        time_s - attempt_kept_.back().input.time_s < 0.98 * attempt_step_s_)
+        return;
+    attempt_kept_.push_back(record);
+    if (attempt_kept_.size() < kAttemptMost) return;
+    for (std::size_t n = 0; 2 * n < attempt_kept_.size(); ++n)
+        attempt_kept_[n] = attempt_kept_[2 * n];
+    attempt_kept_.resize((attempt_kept_.size() + 1) / 2);
+    attempt_step_s_ *= 2;
+}
+
+int PagePlayer::look_at_attempt(double time_s) {
+    if (session_ || attempt_kept_.empty()) return -1;
+    looks_at_attempt_ = true;
+    const auto later = std::upper_bound(
+        attempt_kept_.begin(), attempt_kept_.end(), time_s,
+        [](double t, const FrameRecord& record) { return t < record.input.time_s; });
+    return static_cast<int>(attempt_kept_.end() - std::max(later, attempt_kept_.begin() + 1));
 }
 
 const FrameRecord& PagePlayer::kept_record(int back) const {
-    assert(kept_count_ > 0);
+    assert(kept() > 0);
+    const std::size_t n = std::min(std::max(back, 0), kept() - 1);
+    if (looks_at_attempt_) return attempt_kept_[attempt_kept_.size() - 1 - n];
     const std::size_t size = kept_.size();
-    const std::size_t n = std::min<std::size_t>(std::max(back, 0), kept_count_ - 1);
     return kept_[(kept_next_ + 2 * size - 1 - n) % size];
 }
 
 FrameStatus PagePlayer::frame_again(int back, const ImageSettings& settings) {
-    if (kept_count_ == 0) return FrameStatus::no_contact;
+    if (kept() == 0) return FrameStatus::no_contact;
     if (bundle_.blocks()) bundle_.blocks()->forget_awaited();
     FrameRecord record = kept_record(back);
     record.input.settings = settings;  // gain and TGC still work on a frozen picture
@@ -326,7 +362,7 @@ Status PagePlayer::begin_doppler() {
 }
 
 double PagePlayer::kept_age_s(int back) const {
-    if (kept_count_ == 0) return 0;
+    if (kept() == 0) return 0;
     return kept_record(0).input.time_s - kept_record(back).input.time_s;
 }
 
@@ -351,6 +387,9 @@ Status PagePlayer::start_attempt(const std::string& trainee,
     session_ = std::make_unique<PageSession>(*bundle_, *engine_, trainee, started, seed);
     engine_->begin_session(now_s);
     kept_count_ = 0;
+    attempt_kept_.clear();
+    attempt_step_s_ = kAttemptStepS;
+    looks_at_attempt_ = false;
     return Done{};
 }
 

@@ -14,6 +14,7 @@
 
 #include "formats/base/result.h"
 #include "formats/bundle/case_bundle.h"
+#include "formats/bundle/signature.h"
 #include "formats/exercise/exercise.h"
 #include "formats/recording/session.h"
 #include "formats/scoring/session_monitor.h"
@@ -151,6 +152,9 @@ class PagePlayer {
     // What to fetch next (load_plan.h); max_segments: ahead of what the picture lacks.
     std::vector<SegmentRun> next_runs(std::size_t max_segments);
     void ask_again(SegmentRun run) { plan_.ask_again(run); }
+    // Goes on checking the author's signature, some ms at each call. Null: not done yet, or the
+    // case is not whole.
+    const CaseSignature* check_signature();
     const std::vector<Exercise>& exercises() const { return exercises_; }
     const std::vector<Message>& warnings() const { return warnings_; }
 
@@ -182,7 +186,13 @@ class PagePlayer {
     FrameStatus frame(double now_s, const ImageSettings& settings);
     // A kept picture of the last 20 seconds, `back` pictures before the newest, 0 to kept() - 1.
     FrameStatus frame_again(int back, const ImageSettings& settings);
-    int kept() const { return static_cast<int>(kept_count_); }
+    int kept() const {
+        return static_cast<int>(looks_at_attempt_ ? attempt_kept_.size() : kept_count_);
+    }
+    // The pictures of the attempt that ended last are the kept ones until the next live frame: ten
+    // a second, fewer where it was longer than five minutes. Returns how many lie behind the one at
+    // that time of the attempt; -1: none was kept, and those of the last seconds stay.
+    int look_at_attempt(double time_s);
     double kept_age_s(int back) const;  // time from that picture to the newest
     // # side_px * side_px, of the last picture.
     std::span<const std::uint8_t> pixels() const { return pixels_; }
@@ -225,6 +235,7 @@ class PagePlayer {
     }
 
     StreamedBundle bundle_;
+    std::optional<SignatureCheck> signature_;  // begun once the case is whole
     LoadPlan plan_;
     std::vector<Exercise> exercises_;
     std::vector<Message> warnings_;
@@ -238,6 +249,11 @@ class PagePlayer {
     std::unique_ptr<MouseTracker> hands_;
     std::unique_ptr<ScriptedSweep> watched_;
     std::unique_ptr<PageSession> session_;
+    void keep(const FrameRecord& record, double now_s);
+
+    std::vector<FrameRecord> attempt_kept_;  // of the attempt that runs or ran last
+    double attempt_step_s_ = 0;
+    bool looks_at_attempt_ = false;
     std::vector<FrameRecord> kept_;  // ring
     std::size_t kept_next_ = 0, kept_count_ = 0;
     double kept_last_s_ = -1;

@@ -19,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/base/constants.h"
 #include "formats/files/load_save.h"
 #include "formats/machine/machine.h"
 #include "runtime/engine/skin.h"
@@ -94,15 +95,22 @@ class Frames {
     }
     const Exercise& exercise() const { return exercise_; }
 
-    // Frames of a probe that moves: each was drawn once before, in another order.
+    // Frames of a probe that moves: each was drawn once before, in another order. pool_ml: of fluid
+    // that has been injected 25 mm below the probe's face.
     void frames(const std::string& name,
                 const Exercise& exercise,
                 const RenderOptions& o,
-                double press_mm = 0) {
+                double press_mm = 0,
+                double pool_ml = 0) {
         Renderer renderer = made(exercise, o);
         const auto all = [&] {
             for (FrameInput input : poses_) {
                 input.settings.press_mm = press_mm;
+                if (pool_ml > 0) {
+                    input.change.pool_count = 1;
+                    input.change.pools[0] = {input.mannequin_from_probe * Point3{0, 0, 25},
+                                             std::cbrt(pool_ml * 1e3 * 3 / (4 * kPi)), false};
+                }
                 renderer.render(input, pixels_);
             }
         };
@@ -198,6 +206,17 @@ void count_all(const std::string& path) {
     linear.probe.elevation_mm = 2.5;
     f.frames("physical/modern-linear/at_rest", linear,
              f.options(physical, "-deformation", "modern-linear"));
+    // A procedure in whose pictures nothing was done, and with a pool; the pool may add 8 %.
+    const auto acts = [](Exercise exercise) {
+        exercise.procedure.items.emplace_back();
+        return exercise;
+    };
+    const RenderOptions plain = f.options(physical, "auto", "modern"),
+                        flat = f.options(physical, "auto", "modern-linear");
+    f.frames("physical/modern/procedure", acts(f.exercise()), plain);
+    f.frames("physical/modern/pool_2_ml", acts(f.exercise()), plain, 0, 2);
+    f.frames("physical/modern-linear/procedure", acts(linear), flat);
+    f.frames("physical/modern-linear/pool_2_ml", acts(linear), flat, 0, 2);
     f.colour("physical/colour");
     f.start("first_frame/paper", f.options(paper, "auto"));
     f.start("first_frame/physical", f.options(physical, "auto"));

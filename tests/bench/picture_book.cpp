@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Draws the pictures of docs/effects.md and docs/realism.md from a bundle of scenarios/real-torso:
+// Draws the sheets of README.md, docs/realism.md and docs/effects.md from a bundle of
+// scenarios/real-torso:
 //   sonocase_pictures BUNDLE FOLDER
-// writes FOLDER/effects/MODEL-EFFECT.png, the effect on the left and without it on the right,
-// FOLDER/realism.png and FOLDER/readme.png. Views are named by anatomy, so that another cooking of
-// the case shows the same.
+// writes FOLDER/readme.png, FOLDER/realism.png and FOLDER/effects/press-series.png; the pictures of
+// single effects are drawn by docs/examples/effects. Views are named by anatomy, so that another
+// cooking of the case shows the same.
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -12,7 +13,6 @@
 
 #include "formats/bundle/case_bundle.h"
 #include "formats/files/load_save.h"
-#include "formats/machine/machine.h"
 #include "runtime/imaging/renderer.h"
 #include "runtime/player/session/png_file.h"
 
@@ -36,13 +36,10 @@ const View kViews[] = {
     {"kidney", "kidney_right", {0, -0.9, 0.35}, {1, 0, 0}, false, 150},
     {"aorta", "aorta", {0, 0.05, 1}, {0, 1, 0}, false, 150, {-20, 0, 0}},
     {"gas", "colon", {0, 0.3, 1}, {0, 1, 0}, false, 150, {20, 0, 0}},
-    {"dome", "liver", {0, -0.5, 1}, {0, 1, 0}, false, 150, {30, 0, 0}},
     {"bladder", "urinary_bladder", {0.25, 0, 1}, {1, 0, 0}, false, 180},
-    {"gallbladder", "gallbladder", {-0.4, -0.3, 1}, {0, 1, 0}, false, 130},
     {"rib", "rib_right_9", {0, -1, 0.2}, {1, 0, 0.1}, true, 50},
     {"muscle", "autochthon_right", {0, -0.1, -1}, {1, 0, 0}, true, 50},
     {"vessel", "iliac_artery_left", {-0.3, 0.1, 1}, {0, 1, 0}, true, 60, {-74, 28, 16}},
-    {"fat", "gluteus_maximus_right", {0, -0.4, -1}, {1, 0, 0}, true, 60},
 };
 
 struct Body {
@@ -75,8 +72,8 @@ struct Body {
 
     Vector3 direction(Vector3 v) const { return normalized(v.x * head + v.y * left + v.z * front); }
 
-    // The probe pressed on the skin, lift_mm above where it would be.
-    Rigid pose(const View& view, double lift_mm) const {
+    // The probe pressed on the skin.
+    Rigid pose(const View& view) const {
         const Vector3 out = direction(view.from), beam = -1.0 * out;
         const Point3 aim = middle.at(view.label) + view.aside_mm.x * head + view.aside_mm.y * left +
                            view.aside_mm.z * front;
@@ -87,7 +84,7 @@ struct Body {
                          static_cast<int>(std::lround(v.z))};
             if (!bundle.grid.contains(i.x, i.y, i.z) || bundle.label_bricks.at(i.x, i.y, i.z) == 0)
                 continue;
-            face = aim + (s - (view.linear ? 1.0 : 4.0) + lift_mm) * out;
+            face = aim + (s - (view.linear ? 1.0 : 4.0)) * out;
             break;
         }
         const Vector3 wish = direction(view.lateral);
@@ -110,25 +107,17 @@ struct Picture {
     }
 };
 
-struct Shot {
-    const char* view = "liver";
-    bool needle = false, target = false;
-    double lift_mm = 0, breathing_mm = 0, pulse_mm = 0, press_mm = 0;
-    const char* machine = "";  // "": the probe's own; "sharpened": that with an unsharp mask
-};
-
 Picture draw(const Body& body,
-             const Shot& shot,
+             const char* name,
              ImageModel model,
-             const std::vector<std::string>& effects,
              int width,
              int height,
-             int looks = 0) {
+             double press_mm = 0) {
     const View* view = kViews;
     for (const View& v : kViews)
-        if (std::string(v.name) == shot.view) view = &v;
+        if (std::string(v.name) == name) view = &v;
     Exercise e;
-    e.name = shot.view;
+    e.name = name;
     e.probe.depth_mm = view->depth_mm;
     if (view->linear) {
         e.probe.shape = ProbeShape::linear;
@@ -137,42 +126,15 @@ Picture draw(const Body& body,
         e.probe.focus_mm = 25;
         e.probe.elevation_mm = 2;
     }
-    const Rigid pose = body.pose(*view, shot.lift_mm);
+    const Rigid pose = body.pose(*view);
     e.start_probe = Point3{} + pose.translation;  // what the opening gain is worked out from
     e.start_beam = pose.rotation.column(2);
     runtime::FrameInput input;
     input.mannequin_from_probe = pose;
     input.frame = 3;
-    input.settings.press_mm = shot.press_mm;
-    if (shot.breathing_mm > 0) {
-        e.breathing.amplitude_mm = shot.breathing_mm;
-        e.breathing.direction = -1.0 * body.head;
-        input.time_s = 0.5 * e.breathing.period_s;
-    }
-    if (shot.pulse_mm > 0) {
-        e.pulsation.amplitude_mm = shot.pulse_mm;
-        input.time_s = 0.15 * 60 / e.pulsation.rate_per_min;
-    }
-    if (shot.target) {
-        Target t;
-        t.centre = pose * Point3{0, 0, 75};
-        t.radius_mm = 12;
-        t.look = TargetLook::cyst;
-        e.targets = {t};
-    }
-    input.has_needle = shot.needle;
-    input.needle.tip = pose * Point3{12, 0, 75};
-    input.needle.direction = pose.rotation * normalized(Vector3{0.8, 0, 0.6});
+    input.settings.press_mm = press_mm;
     runtime::RenderOptions o;
     o.model = model;
-    o.effects = effects;
-    o.looks = looks;
-    if (shot.machine == std::string("sharpened")) {
-        o.machine = Machine{};
-        o.machine->edge_enhancement = 1;
-    } else if (shot.machine[0] != 0) {
-        o.machine = *built_in_machine(shot.machine);
-    }
     o.width_px = width;
     o.height_px = height;
     Picture p(width, height);
@@ -180,77 +142,10 @@ Picture draw(const Body& body,
     return p;
 }
 
-// Effects that only some machines have.
-Shot classic(const char* view) {
-    Shot shot;
-    shot.view = view;
-    shot.machine = "classic";
-    return shot;
-}
-Shot sharpened(const char* view) {
-    Shot shot;
-    shot.view = view;
-    shot.machine = "sharpened";
-    return shot;
-}
-
-// Where each effect shows best.
-Shot shot_of(const std::string& effect) {
-    static const std::map<std::string, Shot> shots{{"contact", {"liver", false, false, 5}},
-                                                   {"breathing", {"kidney", false, false, 0, 15}},
-                                                   {"pulsation", {"vessel", false, false, 0, 0, 1}},
-                                                   {"boundaries", {"rib"}},
-                                                   {"structure", {"kidney"}},
-                                                   {"fine_structure", {"muscle"}},
-                                                   {"targets", {"liver", false, true}},
-                                                   {"interfaces", {"muscle"}},
-                                                   {"edge_shadow", {"gallbladder"}},
-                                                   {"attenuation", {"bladder"}},
-                                                   {"bone_tail", {"rib"}},
-                                                   {"gas_ring_down", {"gas"}},
-                                                   {"needle", {"liver", true}},
-                                                   {"near_field", {"fat"}},
-                                                   {"diaphragm", {"dome"}},
-                                                   {"noise", classic("bladder")},
-                                                   {"persistence", classic("bladder")},
-                                                   {"haze", classic("bladder")},
-                                                   {"post_filter", classic("kidney")},
-                                                   {"grey_map", classic("kidney")},
-                                                   {"edge_enhancement", sharpened("kidney")},
-                                                   {"equalisation", {"kidney"}},
-                                                   {"shadow", {"kidney"}},
-                                                   {"texture", {"kidney"}}};
-    const auto found = shots.find(effect);
-    return found == shots.end() ? Shot{} : found->second;
-}
-
 bool save(const std::string& path, const Picture& p) {
     const Status saved = runtime::write_png(path, p.width, p.height, 1, p.pixels);
     if (!saved) std::fprintf(stderr, "%s\n", saved.error().message().c_str());
     return saved.has_value();
-}
-
-bool always_on(const std::string& effect) {
-    return effect == "slice" || effect == "compression" || effect == "scan_conversion";
-}
-
-bool effect_pictures(const Body& body, const std::string& folder) {
-    constexpr int kWidth = 300, kHeight = 300, kGap = 4;
-    for (const auto model : {ImageModel::paper, ImageModel::physical}) {
-        for (const char* name : runtime::effect_names(model)) {
-            if (always_on(name)) continue;
-            const Shot shot = shot_of(name);
-            Picture both(2 * kWidth + kGap, kHeight, 90);
-            both.put(draw(body, shot, model, {"auto"}, kWidth, kHeight), 0, 0);
-            const bool looks = name == std::string("looks");  // has a number and no switch
-            const auto without = looks ? std::string("auto") : std::string("-") + name;
-            both.put(draw(body, shot, model, {without}, kWidth, kHeight, looks ? 1 : 0),
-                     kWidth + kGap, 0);
-            const char* prefix = model == ImageModel::paper ? "/paper-" : "/physical-";
-            if (!save(folder + prefix + name + ".png", both)) return false;
-        }
-    }
-    return true;
 }
 
 // The femoral vessels under a probe that presses more and more, in both models.
@@ -261,12 +156,12 @@ bool press_series(const Body& body, const std::string& path) {
                 90);
     int at = 0;
     for (const double press_mm : depths_mm) {
-        Shot shot;
-        shot.view = "vessel";
-        shot.press_mm = press_mm;
         const int x = at++ * (kWidth + kGap);
-        row.put(draw(body, shot, ImageModel::physical, {"auto"}, kWidth, kHeight), x, 0);
-        row.put(draw(body, shot, ImageModel::paper, {"auto"}, kWidth, kHeight), x, kHeight + kGap);
+        const auto vessel = [&](ImageModel model) {
+            return draw(body, "vessel", model, kWidth, kHeight, press_mm);
+        };
+        row.put(vessel(ImageModel::physical), x, 0);
+        row.put(vessel(ImageModel::paper), x, kHeight + kGap);
     }
     return save(path, row);
 }
@@ -281,10 +176,8 @@ bool sheet_of(const Body& body,
     Picture sheet(4 * (kWidth + kGap) - kGap, height, 40);
     for (std::size_t row = 0; row < rows.size(); ++row) {
         for (std::size_t i = 0; i < rows[row].size(); ++i) {
-            Shot shot;
-            shot.view = rows[row][i];
             const auto model = row < physical ? ImageModel::physical : ImageModel::paper;
-            sheet.put(draw(body, shot, model, {"auto"}, kWidth, kHeight),
+            sheet.put(draw(body, rows[row][i], model, kWidth, kHeight),
                       static_cast<int>(i) * (kWidth + kGap),
                       static_cast<int>(row) * (kHeight + kGap));
         }
@@ -309,8 +202,7 @@ int run(const std::string& path, const std::string& folder) {
     }
     const std::vector<const char*> fan{"liver", "kidney", "aorta", "gas"},
         linear{"bladder", "rib", "muscle", "vessel"}, paper{"kidney", "aorta", "bladder", "muscle"};
-    return effect_pictures(body, folder + "/effects") &&
-                   press_series(body, folder + "/effects/press-series.png") &&
+    return press_series(body, folder + "/effects/press-series.png") &&
                    sheet_of(body, {fan, linear, paper}, 2, folder + "/realism.png") &&
                    sheet_of(body, {fan, linear}, 2, folder + "/readme.png")
                ? 0

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// core_write_case BUNDLE SESSION [flow]: a small case (in whose vessel blood flows), and a session
-// of three seconds in which the probe slides over it and a needle goes in.
+// core_write_case BUNDLE SESSION [flow|procedure]: a small case (in whose vessel blood flows; with
+// a second exercise that is a procedure), and a session of three seconds in which the probe slides
+// over it and a needle goes in.
 #include <cstdint>
 #include <fstream>
+#include <string_view>
 #include <vector>
 
 #include "formats/bundle/case_bundle.h"
@@ -44,7 +46,9 @@ bool write(const char* path, const std::vector<std::uint8_t>& bytes) {
 int main(int argc, char** argv) {
     if (argc != 3 && argc != 4) return 2;
     CaseBundle bundle = testing::small_case();
-    if (argc == 4) testing::add_flow(bundle);
+    const std::string_view with = argc == 4 ? argv[3] : "";
+    if (with == "flow") testing::add_flow(bundle);
+    if (with == "procedure") bundle.exercises.push_back({"line", testing::small_procedure_toml()});
     const Sequence session = sequence_from_session(small_session());
     const bool good = write(argv[1], write_bundle(bundle)) &&
                       write(argv[2], write_sequence(session, SequenceForm::mha));

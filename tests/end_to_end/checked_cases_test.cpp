@@ -18,16 +18,15 @@
 #include "pipeline/aim/plain_case.h"
 #include "pipeline/check/check_case.h"
 #include "pipeline/pathology/place_pathology.h"
+#include "support/cooked_case.h"
 #include "support/paths.h"
-#include "support/run_command.h"
 
 namespace sonocase::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::cooked_scenario;
 using testing::repaint;
-using testing::run_command;
-using testing::TemporaryFolder;
 
 struct Body {
     const char* scenario;
@@ -48,14 +47,8 @@ const CaseBundle* cooked(const Body& body) {
     const std::string data = SONOCASE_DATA;
     if (std::string(body.scenario) != "demo-torso" && !fs::exists(data + "/ct/labels.nii.gz"))
         return nullptr;
-    const TemporaryFolder folder;
-    const std::string path = folder / "case.sonocase";
-    const auto build =
-        run_command(std::string(SONOCASE_BIN) + "/sonocase build " + SONOCASE_SOURCE +
-                    "/scenarios/" + body.scenario + " --data " + data + " --preset draft " +
-                    body.settings + " --quiet -o " + path);
-    EXPECT_EQ(build.status, 0) << build.error;
-    auto bundle = load_bundle(path);
+    auto bundle = load_bundle(
+        cooked_scenario(body.scenario, "--preset draft " + std::string(body.settings)).path);
     EXPECT_TRUE(bundle) << bundle.error().message();
     if (!bundle) return nullptr;
     return &known.emplace(body.scenario, std::move(*bundle)).first->second;

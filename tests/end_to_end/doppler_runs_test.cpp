@@ -13,6 +13,7 @@
 #include "formats/flow/flow_summary.h"
 #include "runtime/imaging/doppler/colour_image.h"
 #include "runtime/imaging/doppler_cases.h"
+#include "support/cooked_case.h"
 #include "support/paths.h"
 #include "support/run_command.h"
 #include "support/small_case.h"
@@ -169,11 +170,8 @@ TEST(DopplerRuns, VesselsOfTheRealTorsoAndTheirExercises) {
     const std::string data = SONOCASE_DATA;
     if (!fs::exists(data + "/ct/labels.nii.gz")) GTEST_SKIP() << "no " << data;
     const TemporaryFolder folder;
-    const std::string path = folder / "case.sonocase";
-    const auto build = run_command(std::string(SONOCASE_BIN) + "/sonocase build " +
-                                   SONOCASE_SOURCE + "/scenarios/vessels/case.toml --data " + data +
-                                   " --set resample.voxel_mm=1.5 --quiet -o " + path);
-    ASSERT_EQ(build.status, 0) << build.error;
+    const std::string path =
+        testing::cooked_scenario("vessels/case.toml", "--set resample.voxel_mm=1.5").path;
     const auto bundle = load_bundle(path);
     ASSERT_TRUE(bundle) << bundle.error().message();
     expect_normal(bundle->flow);
@@ -201,10 +199,7 @@ TEST(DopplerRuns, VesselsOfTheRealTorsoAndTheirExercises) {
 // 300 mL/min in straight tubes of an even material: parabolas, whose peak is twice the mean.
 TEST(DopplerRuns, TheFlowPhantomMeasuresWhatIsPumpedThroughIt) {
     const TemporaryFolder folder;
-    const std::string path = folder / "phantom.sonocase";
-    const auto build = run_command(std::string(SONOCASE_BIN) + "/sonocase build " +
-                                   SONOCASE_SOURCE + "/scenarios/flow-phantom --quiet -o " + path);
-    ASSERT_EQ(build.status, 0) << build.error;
+    const std::string path = testing::cooked_scenario("flow-phantom").path;
     const auto bundle = load_bundle(path);
     ASSERT_TRUE(bundle) << bundle.error().message();
     const auto all = vessel_summaries(bundle->flow, 1);

@@ -9,6 +9,7 @@
 #include "end_to_end/scripted_trainees.h"
 #include "formats/files/load_save.h"
 #include "formats/scoring/draw_attempt.h"
+#include "support/cooked_case.h"
 #include "support/paths.h"
 #include "support/run_command.h"
 
@@ -114,58 +115,44 @@ void expect_honest(const Case& of, int bluffs, int expert_attempts) {
     EXPECT_GE(all_experts.passed, 0.95 * all_experts.attempts);
 }
 
-std::string cooked(const testing::TemporaryFolder& folder, const std::string& arguments) {
-    const std::string path = folder / "case.sonocase";
-    const auto build = testing::run_command(std::string(SONOCASE_BIN) + "/sonocase build " +
-                                            arguments + " --quiet -o " + path);
-    EXPECT_EQ(build.status, 0) << build.error;
-    // Our own torsos are cooked without a warning; the gallery says that its map is known.
-    const bool own = arguments.find("/") == std::string::npos ||
-                     arguments.find("procedures") != std::string::npos;
-    if (own) {
-        EXPECT_EQ(build.error.find("warning"), std::string::npos) << build.error;
-    }
-    return path;
+// Our own torsos are cooked without a warning; the gallery says that its map is known.
+std::string cooked_in_silence(const std::string& arguments) {
+    const testing::CookedCase& cooked = testing::cooked_case(arguments);
+    EXPECT_EQ(cooked.error.find("warning"), std::string::npos) << cooked.error;
+    return cooked.path;
 }
 
 TEST(HonestExercises, OfTheDemoTorso) {
-    const testing::TemporaryFolder folder;
-    expect_honest(Case(cooked(folder, "--preset draft")), 1000, 20);
+    expect_honest(Case(cooked_in_silence("--preset draft")), 1000, 20);
 }
 
 TEST(HonestExercises, OfTheRealTorso) {
     const std::string data = SONOCASE_DATA;
     if (!fs::exists(data + "/ct/labels.nii.gz")) GTEST_SKIP() << "no " << data;
-    const testing::TemporaryFolder folder;
-    expect_honest(Case(cooked(folder, std::string(SONOCASE_SOURCE) +
-                                          "/scenarios/real-torso/case.toml --data " + data +
-                                          " --set resample.voxel_mm=2")),
-                  1000, 20);
+    const auto& cooked =
+        testing::cooked_scenario("real-torso/case.toml", "--set resample.voxel_mm=2");
+    expect_honest(Case(cooked.path), 1000, 20);
 }
 
 // Exercises of the other scenarios whose script has a needle from the start; those that press or
 // look in colour first are played by pressing_exercises_test.cpp and doppler_runs_test.cpp.
 TEST(HonestExercises, ScriptsOfTheGalleryPassTheirMarks) {
-    const testing::TemporaryFolder folder;
-    expect_scripts_pass(Case(
-        cooked(folder, std::string(SONOCASE_SOURCE) + "/scenarios/lesion-gallery --preset draft")));
+    expect_scripts_pass(Case(testing::cooked_scenario("lesion-gallery", "--preset draft").path));
 }
 
 TEST(HonestExercises, ScriptsOfTheWomanPassTheirMarks) {
     const std::string data = SONOCASE_DATA;
     if (!fs::exists(data + "/organ_meshes")) GTEST_SKIP() << "no " << data;
-    const testing::TemporaryFolder folder;
-    expect_scripts_pass(Case(cooked(folder, std::string(SONOCASE_SOURCE) +
-                                                "/scenarios/atlas-woman/case.toml --data " + data +
-                                                " --set resample.voxel_mm=2")));
+    const auto& cooked =
+        testing::cooked_scenario("atlas-woman/case.toml", "--set resample.voxel_mm=2");
+    expect_scripts_pass(Case(cooked.path));
 }
 
 // The experts of the procedures pass where a trainee meets them: cooked, on the mannequin, through
 // the player.
 TEST(HonestExercises, ExpertsPassTheProceduresInThePlayer) {
-    const testing::TemporaryFolder folder;
     const std::string path =
-        cooked(folder, std::string(SONOCASE_SOURCE) + "/scenarios/procedures --preset draft");
+        cooked_in_silence(SONOCASE_SOURCE "/scenarios/procedures --preset draft");
     for (const Exercise& exercise : Case(path).exercises) {
         testing::expect_expert_ticks_all(path, exercise.name);
     }
@@ -173,8 +160,7 @@ TEST(HonestExercises, ExpertsPassTheProceduresInThePlayer) {
 
 TEST(HonestExercises, TheExpertPassesTheCentralLineInThePlayerAndTheNeckIsChecked) {
     const testing::TemporaryFolder folder;
-    const std::string path = cooked(
-        folder, std::string(SONOCASE_SOURCE) + "/scenarios/neck --set resample.voxel_mm=1.5");
+    const std::string path = testing::cooked_scenario("neck", "--set resample.voxel_mm=1.5").path;
     for (const char* exercise : {"central-line", "jugular-across"})
         testing::expect_expert_ticks_all(path, exercise);
     const auto check = testing::run_command(std::string(SONOCASE_BIN) + "/sonocase check " + path +

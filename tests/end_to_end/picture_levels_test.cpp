@@ -25,9 +25,9 @@
 #include "runtime/imaging/renderer.h"
 #include "runtime/tracking/mouse_tracker.h"
 #include "runtime/tracking/scripted_sweep.h"
+#include "support/cooked_case.h"
 #include "support/paths.h"
 #include "support/picture.h"
-#include "support/run_command.h"
 
 namespace sonocase {
 namespace {
@@ -284,14 +284,6 @@ void measure(const std::string& path, bool judge) {
     }
 }
 
-std::string cooked(const testing::TemporaryFolder& folder, const std::string& arguments) {
-    const std::string path = folder / "case.sonocase";
-    const auto build = testing::run_command(std::string(SONOCASE_BIN) + "/sonocase build " +
-                                            arguments + " --quiet -o " + path);
-    EXPECT_EQ(build.status, 0) << build.error;
-    return path;
-}
-
 // Prints and does not judge, hence no part of the tests.
 TEST(PictureLevels, DISABLED_AsMeasuredInNamedBundles) {
     const char* named = std::getenv("SONOCASE_LEVELS");
@@ -301,18 +293,14 @@ TEST(PictureLevels, DISABLED_AsMeasuredInNamedBundles) {
 }
 
 TEST(PictureLevels, OfTheDemoTorso) {
-    const testing::TemporaryFolder folder;
-    measure(cooked(folder, "--preset draft"), true);
+    measure(testing::cooked_case("--preset draft").path, true);
 }
 
 TEST(PictureLevels, OfTheRealTorso) {
     const std::string data = SONOCASE_DATA;
     if (!fs::exists(data + "/ct/labels.nii.gz")) GTEST_SKIP() << "no " << data;
-    const testing::TemporaryFolder folder;
-    measure(
-        cooked(folder, std::string(SONOCASE_SOURCE) + "/scenarios/real-torso/case.toml --data " +
-                           data + " --set resample.voxel_mm=2"),
-        true);
+    measure(testing::cooked_scenario("real-torso/case.toml", "--set resample.voxel_mm=2").path,
+            true);
 }
 
 }  // namespace

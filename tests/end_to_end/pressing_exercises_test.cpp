@@ -11,8 +11,8 @@
 #include "end_to_end/pressing_hand.h"
 #include "end_to_end/scripted_trainees.h"
 #include "formats/files/load_save.h"
+#include "support/cooked_case.h"
 #include "support/paths.h"
-#include "support/run_command.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -25,17 +25,11 @@ using sonocase::testing::TemporaryFolder;
 
 // The bundle of the recipe on the shared data, cooked once; null without them.
 const OpenCase* pressing_case() {
-    static const TemporaryFolder folder;
     static const std::unique_ptr<OpenCase> open = [] {
-        const std::string data = SONOCASE_DATA;
-        if (!fs::exists(data + "/ct/labels.nii.gz")) return std::unique_ptr<OpenCase>();
-        const std::string path = folder / "case.sonocase";
-        const auto build = sonocase::testing::run_command(
-            std::string(SONOCASE_BIN) + "/sonocase build " + SONOCASE_SOURCE +
-            "/scenarios/pressing/case.toml --data " + data +
-            " --set resample.voxel_mm=1.5 --quiet -o " + path);
-        EXPECT_EQ(build.status, 0) << build.error;
-        auto opened = open_case(path);
+        if (!fs::exists(SONOCASE_DATA "/ct/labels.nii.gz")) return std::unique_ptr<OpenCase>();
+        auto opened = open_case(
+            sonocase::testing::cooked_scenario("pressing/case.toml", "--set resample.voxel_mm=1.5")
+                .path);
         EXPECT_TRUE(opened) << opened.error().message();
         return std::move(*opened);
     }();

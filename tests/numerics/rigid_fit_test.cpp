@@ -8,9 +8,12 @@
 #include "formats/base/constants.h"
 #include "formats/calibration/landmarks.h"
 #include "numerics/property.h"
+#include "support/hard_case.h"
 
 namespace sonocase::numerics {
 namespace {
+
+using testing::HardCase;
 
 struct Shape {
     std::vector<Point3> points;
@@ -30,8 +33,13 @@ Shape shape(testing::Random& random, int kind) {
     return s;
 }
 
-RC_GTEST_PROP(RigidFitNumerics, ExactPairsComeBackAtEveryAngleShapeAndScale, ()) {
-    testing::Random random = random_case();
+struct ExactPairs {
+    bool determined = false;                        // a shape that is a line by chance is not
+    double angle = 0, rms = 0, orthonormality = 0;  // errors over their bounds
+    double turn = 0;                                // determinant
+};
+
+ExactPairs exact_pairs(testing::Random random) {
     const int kind = static_cast<int>(random.uniform(0, 3.999));
     const Shape s = shape(random, kind);
     const double size = std::pow(10.0, random.uniform(0.5, 5)),
@@ -49,14 +57,33 @@ RC_GTEST_PROP(RigidFitNumerics, ExactPairsComeBackAtEveryAngleShapeAndScale, ())
         to.push_back(truth * from.back());
     }
     const RigidFit fit = fit_rigid(from, to);
-    RC_PRE(fit.determined);  // a shape that is a line by chance is not
     // Rounding of stored coordinates over the narrower side of the shape.
     const double angle_bound = 300 * kEpsilon * (size + away) / (size * s.width);
-    RC_ASSERT(rotation_angle(transpose(fit.to_from.rotation) * truth.rotation) <=
-              20 * angle_bound / s.width);
-    RC_ASSERT(fit.rms_mm <= 300 * kEpsilon * (size + away));
-    RC_ASSERT(orthonormality_error(fit.to_from.rotation) < 1e-14);
-    RC_ASSERT(determinant(fit.to_from.rotation) > 0);
+    return {fit.determined,
+            rotation_angle(transpose(fit.to_from.rotation) * truth.rotation) /
+                (20 * angle_bound / s.width),
+            fit.rms_mm / (300 * kEpsilon * (size + away)),
+            orthonormality_error(fit.to_from.rotation) / 1e-14, determinant(fit.to_from.rotation)};
+}
+
+RC_GTEST_PROP(RigidFitNumerics, ExactPairsComeBackAtEveryAngleShapeAndScale, ()) {
+    const ExactPairs e = exact_pairs(random_case());
+    RC_PRE(e.determined);
+    RC_ASSERT(e.angle <= 1);
+    RC_ASSERT(e.rms <= 1);
+    RC_ASSERT(e.orthonormality < 1);
+    RC_ASSERT(e.turn > 0);
+}
+
+TEST(RigidFitNumerics, ExactPairsOfAThousandShapesOverTheirBounds) {
+    HardCase angle("angle over its bound, a thousand shapes", HardCase::at_most, 1, "");
+    HardCase rms("rms over its bound, a thousand shapes", HardCase::at_most, 1, "");
+    for (std::uint64_t seed = 1; seed <= 1000; ++seed) {
+        const ExactPairs e = exact_pairs(testing::Random(seed));
+        if (!e.determined) continue;
+        angle.see(e.angle);
+        rms.see(e.rms);
+    }
 }
 
 RC_GTEST_PROP(RigidFitNumerics, NoiseMovesTheFitAsItsSigmaSays, ()) {
@@ -100,13 +127,14 @@ RC_GTEST_PROP(RigidFitNumerics, SwappingTheSidesInvertsTheMotion, ()) {
 
 TEST(RigidFitNumerics, AMirrorIsNeverTheAnswer) {
     testing::Random random(1);
+    HardCase turn("determinant of the answer to a mirror", HardCase::at_least, 0.999, "");
     for (int draw = 0; draw < 50; ++draw) {
         std::vector<Point3> from, to;
         for (int i = 0; i < 6; ++i) {
             from.push_back(random.point(100));
             to.push_back({-from.back().x, from.back().y, from.back().z});
         }
-        EXPECT_GT(determinant(fit_rigid(from, to).to_from.rotation), 0.999);
+        turn.see(determinant(fit_rigid(from, to).to_from.rotation));
     }
 }
 

@@ -1,10 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a case says about itself, and the scores of a session on it."""
 
+import json
+import os
+import pathlib
+import subprocess
+
 import numpy as np
 import pytest
 
 import sonocase
+
+BIN = pathlib.Path(os.environ["SONOCASE_BIN"])
 
 
 def test_labels_and_exercises(case):
@@ -64,3 +71,18 @@ def test_a_session_is_read_and_scored(case, small):
     assert score["targets"][0]["name"] == "vessel"
     with pytest.raises(sonocase.Error, match="no such file"):
         sonocase.score(case, "/nowhere/session.igs.mha")
+
+
+def test_the_list_of_a_procedure_is_the_players(tmp_path, sonoplay):
+    case, session, stats = tmp_path / "a.sonocase", tmp_path / "line.igs.mha", tmp_path / "stats.json"
+    subprocess.run([BIN / "core_write_case", case, tmp_path / "other.igs.mha", "procedure"], check=True)
+    sonoplay(case, "--exercise", "line", "--tracker", "sweep:expert", "--record", session, "--stats", stats,
+             "--headless")
+    played = json.loads(stats.read_text())["procedure"]
+    assert sonocase.score(sonocase.Case.open(case), session)["procedure"] == played
+    ticked = {item["name"]: item["ticked"] for item in played["items"]}
+    assert ticked == {"looked": True, "numbed": True, "drawn": True, "pressed": False, "deep": True, "asked": True}
+    # The moments are those of the script: looked at for half a second, injected at 2 s, drawn at 3 s.
+    done = {step["name"]: step["time_s"] for step in played["steps"]}
+    assert done["look"] == pytest.approx(0.5, abs=0.1)
+    assert (done["numb"], done["draw"]) == (pytest.approx(2, abs=0.05), pytest.approx(3, abs=0.05))

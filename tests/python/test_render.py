@@ -400,6 +400,21 @@ def test_a_pose_in_metres_is_refused(case, pose):
     with pytest.raises(ValueError, match=r"poses\[1\]: .*millimetres"):
         renderer.render_batch(np.stack([pose, metres]))
     renderer.render(np.eye(4))  # a face at the very origin is somebody's choice
+    needle = pose.copy()
+    needle[:3, 3] += 30 * pose[:3, 2]
+    renderer.render(pose, needle)
+    needle[:3, 3] /= 1000
+    tip = (needle[:3, 3], needle[:3, 2])
+    for given in (needle, tip):
+        for use in (lambda: renderer.render(pose, given), lambda: renderer.render(pose, given, mode="colour")):
+            with pytest.raises(ValueError, match="^needle: .*millimetres, not in metres"):
+                use()
+        with pytest.raises(ValueError, match=r"^needles\[1\]: .*millimetres"):
+            renderer.render_batch(np.stack([pose, pose]), [None, given])
+    # A tip at the origin, or away from the probe, is one in millimetres.
+    renderer.render(pose, (np.zeros(3), pose[:3, 2]))
+    away = pose[:3, 3] / np.linalg.norm(pose[:3, 3])
+    renderer.render(pose, (-1.5 * away, pose[:3, 2]))
     for bad in (10, 121, float("nan")):
         with pytest.raises(ValueError, match="dynamic_range_db: .*20 to 120"):
             renderer.render(pose, dynamic_range_db=bad)

@@ -54,6 +54,110 @@ needle_direction = [-8, 0, -9]
 )";
 }
 
+// A procedure on it: each kind of item, and an expert who does all but press.
+inline const char* small_procedure_toml() {
+    return R"(name = "line"
+title = "Draw blood"
+description = "Numb the way, bring the needle into the vessel, draw blood, press."
+kind = "vascular"
+model = "paper"
+start_probe = [0, 0, 70]
+start_beam = [0, 0, -1]
+[probe]
+shape = "curvilinear"
+radius_mm = 60
+field_of_view_deg = 65
+depth_mm = 100
+[needle]
+gauge = 18
+length_mm = 120
+[[targets]]
+name = "vessel"
+centre = [0, 0, 25]
+radius_mm = 5
+hit_radius_mm = 6
+[procedure]
+cut = 3
+[[steps]]
+name = "look"
+title = "Look first"
+instruction = "Show the vessel. No needle yet."
+done = { shows = "vessel", needle_in = false, hold_s = 0.5 }
+[[steps]]
+name = "numb"
+title = "Numb the way"
+instruction = "Inject 3 ml on the way."
+done = { act = "inject", at_least = 3, tip_in = "body" }
+[[steps]]
+name = "draw"
+title = "Draw blood"
+instruction = "Tip in the vessel; draw 2 ml."
+done = { act = "aspirate", at_least = 2, tip_in = "vessel" }
+[[steps]]
+name = "press"
+title = "Press"
+instruction = "Needle out; press for ten seconds."
+done = { act = "compress", at_least = 10, needle_in = false }
+[[items]]
+name = "looked"
+title = "Looked first"
+step = "look"
+[[items]]
+name = "numbed"
+title = "Way numbed"
+step = "numb"
+weight = 2
+[[items]]
+name = "drawn"
+title = "Blood drawn"
+critical = true
+step = "draw"
+[[items]]
+name = "pressed"
+title = "Pressed"
+step = "press"
+[[items]]
+name = "deep"
+title = "Never deeper than 45 mm"
+never = { depth_at_least_mm = 45, needle_in = true }
+[[items]]
+name = "asked"
+title = "Asked before"
+question = "What is below the skin?"
+options = ["Air", "A vessel"]
+answer = 1
+[[sweeps]]
+name = "expert"
+snap_to_skin = true
+[[sweeps.keys]]
+time_s = 0
+probe = [0, 0, 62]
+acts = "answer:5=1"
+[[sweeps.keys]]
+time_s = 1
+probe = [0, 0, 62]
+needle_tip = [40, 0, 70]
+needle_direction = [-8, 0, -9]
+[[sweeps.keys]]
+time_s = 2
+probe = [0, 0, 62]
+needle_tip = [16, 0, 43]
+needle_direction = [-8, 0, -9]
+acts = "inject=3"
+[[sweeps.keys]]
+time_s = 3
+probe = [0, 0, 62]
+needle_tip = [0, 0, 25]
+needle_direction = [-8, 0, -9]
+acts = "aspirate=2"
+[[sweeps.keys]]
+time_s = 4
+probe = [0, 0, 62]
+needle_tip = [40, 0, 70]
+needle_direction = [-8, 0, -9]
+)";
+}
+
 // A cylinder along y of radius 60 mm about (0, *, 0), 160 mm long, in a box of 140 x 160 x 140 mm
 // with voxels of 2 mm; a vessel of radius 6 mm along y through (0, *, 25). Outside is label 0.
 inline CaseBundle small_case() {

@@ -391,10 +391,7 @@ Status ChunkReader::unpack(std::string_view type,
     return Done{};
 }
 
-namespace {
-
-// The types in the table of a file that need not be valid.
-std::vector<std::string> types_of(std::span<const std::uint8_t> bytes) {
+std::vector<std::string> chunk_types(std::span<const std::uint8_t> bytes) {
     constexpr std::size_t kTypeBytes = 8;
     std::vector<std::string> types;
     if (bytes.size() < kHeaderBytes) return types;
@@ -408,15 +405,13 @@ std::vector<std::string> types_of(std::span<const std::uint8_t> bytes) {
     return types;
 }
 
-}  // namespace
-
 Result<std::vector<std::uint8_t>> rearranged(std::span<const std::uint8_t> bytes,
                                              std::string_view kind,
                                              std::span<const std::string_view> order,
                                              int level,
                                              const std::string& where,
                                              JobRunner& jobs) {
-    std::vector<std::string> types = types_of(bytes);
+    std::vector<std::string> types = chunk_types(bytes);
     const std::vector<std::string_view> known(types.begin(), types.end());
     SONOCASE_TRY(const auto reader, ChunkReader::open(bytes, kind, known, where));
     const auto rank = [&](const std::string& type) {

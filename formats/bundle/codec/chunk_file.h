@@ -132,6 +132,9 @@ class ChunkReader {
     std::string where_;
 };
 
+// The types in the table of a file, which need not be valid; in its order.
+std::vector<std::string> chunk_types(std::span<const std::uint8_t> file);
+
 // The same chunks in another order: those of `order` first, the others after them as they were.
 // Compressed chunks are compressed again at `level` of zstd. bytes: a whole file of this kind.
 Result<std::vector<std::uint8_t>> rearranged(std::span<const std::uint8_t> bytes,

@@ -24,7 +24,6 @@
 #include "pipeline/base/text.h"
 #include "pipeline/import/volume/dicom_frames.h"
 #include "pipeline/import/volume/dicom_segmentation.h"
-#include "pipeline/import/volume/itk_component.h"
 #include "pipeline/import/volume/native_volume.h"
 
 namespace sonocase::pipeline::inline import_volume {
@@ -555,7 +554,7 @@ void unshear(const DicomStack& stack, NativeVolume& volume) {
 
 // Reads one slice to the end of the volume, which begins with the first and takes its type.
 Status append_slice(const DicomSlice& slice, itk::GDCMImageIO& io, NativeVolume& volume) {
-    const auto component = component_of(io.GetComponentType());
+    const auto component = component_called(io.GetComponentTypeAsString(io.GetComponentType()));
     if (!component || io.GetNumberOfComponents() != 1)
         return Error{"pixels that are not one whole number each", slice.path, kExpected};
     if (!volume.bytes.empty() && *component != volume.component)

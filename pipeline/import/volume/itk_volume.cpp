@@ -13,7 +13,6 @@
 #include "pipeline/base/quiet_library.h"
 #include "pipeline/base/source_checks.h"
 #include "pipeline/base/text.h"
-#include "pipeline/import/volume/itk_component.h"
 #include "pipeline/import/volume/native_volume.h"
 #include "pipeline/import/volume/nifti_file.h"
 #include "pipeline/import/volume/volume_file.h"
@@ -162,10 +161,9 @@ Result<NativeVolume> read_itk_volume(const std::string& path, const VolumeReadin
         if (dimensions < 3)
             return Error{"an image of " + sizes_text(*io) + " pixels", path,
                          "expected a volume of three dimensions"};
-        const auto component = component_of(io->GetComponentType());
-        if (!component)
-            return Error{"voxels of type " + io->GetComponentTypeAsString(io->GetComponentType()),
-                         path, "expected whole numbers"};
+        const std::string type = io->GetComponentTypeAsString(io->GetComponentType());
+        const auto component = component_called(type);
+        if (!component) return Error{"voxels of type " + type, path, "expected whole numbers"};
         SONOCASE_TRY_DONE(check_sizes(*io, placement, path));
 
         NativeVolume volume;

@@ -15,6 +15,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "formats/base/result.h"
@@ -40,6 +41,28 @@ constexpr std::size_t bytes_of(Component component) {
         case Component::f64: break;
     }
     return 8;
+}
+
+// By ITK's name of the type (ImageIOBase::GetComponentTypeAsString); empty for types that are not
+// plain numbers.
+inline std::optional<Component> component_called(std::string_view name) {
+    constexpr bool long_is_64 = sizeof(long) == 8;
+    static constexpr std::pair<std::string_view, Component> kNames[] = {
+        {"unsigned_char", Component::u8},
+        {"char", Component::i8},
+        {"unsigned_short", Component::u16},
+        {"short", Component::i16},
+        {"unsigned_int", Component::u32},
+        {"int", Component::i32},
+        {"unsigned_long", long_is_64 ? Component::u64 : Component::u32},
+        {"long", long_is_64 ? Component::i64 : Component::i32},
+        {"unsigned_long_long", Component::u64},
+        {"long_long", Component::i64},
+        {"float", Component::f32},
+        {"double", Component::f64}};
+    for (const auto& [known, component] : kNames)
+        if (known == name) return component;
+    return std::nullopt;
 }
 
 // Where a header says that its voxels lie, RAS+ mm: voxel (i, j, k) at origin + columns * (i, j,

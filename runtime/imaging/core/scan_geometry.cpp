@@ -43,6 +43,20 @@ bool ScanGeometry::locate(PlanePoint p, double& line, double& sample) const {
     return line >= -0.5 && line <= scanlines - 0.5 && sample >= -0.5 && sample <= samples - 0.5;
 }
 
+SampleRange samples_near(const ScanGeometry& g, int line, PlanePoint p, double reach_mm) {
+    const auto& [o, d] = g.beams[static_cast<std::size_t>(line)];
+    const double x = p.x - o.x, z = p.z - o.z, along = x * d.x + z * d.z;
+    const double beside2 = std::max(x * x + z * z - along * along, 0.0);
+    if (!(beside2 <= reach_mm * reach_mm)) return {};
+    const double half = std::sqrt(reach_mm * reach_mm - beside2);
+    const auto sample = [&](double r) {
+        return static_cast<int>(std::clamp(r / g.step_mm, -1.0, g.samples + 1.0));
+    };
+    const int begin = std::max(sample(along - half) - 1, 0),
+              end = std::min(sample(along + half) + 1, g.samples);
+    return begin < end ? SampleRange{begin, end} : SampleRange{};
+}
+
 ScanGeometry make_scan_geometry(
     const Probe& probe, int scanlines, int samples, int width_px, int height_px) {
     ScanGeometry g;

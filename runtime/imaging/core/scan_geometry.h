@@ -45,6 +45,13 @@ struct ScanGeometry {
     bool locate(PlanePoint p, double& line, double& sample) const;
 };
 
+// Samples of a beam, within its depth, that lie within `reach_mm` of a point of the plane; empty if
+// none does.
+struct SampleRange {
+    int begin = 0, end = 0;
+};
+SampleRange samples_near(const ScanGeometry& geometry, int line, PlanePoint p, double reach_mm);
+
 // Fits the scanned area into the picture with a margin of 2 %.
 ScanGeometry make_scan_geometry(
     const Probe& probe, int scanlines, int samples, int width_px, int height_px);

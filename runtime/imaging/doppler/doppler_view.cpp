@@ -363,19 +363,21 @@ std::optional<DopplerSettings> DopplerView::aim(const FrameInput& input,
     constexpr double kFarMm = 40;  // beyond all breathing and pressing
     for (const FlowVessel& vessel : m.bundle->flow.vessels) {
         considered = &vessel;
-        std::optional<SeenNode> before;
+        SeenNode before;
+        bool joined = false;  // `before` is the node before this one
         for (int i = 0; i < vessel.nodes; ++i) {
             const FlowNode& node = m.bundle->flow.nodes[vessel.first_node + i];
             if (std::abs((probe_from_mannequin * node.centre).y) > kFarMm) {
-                before.reset();
+                joined = false;
                 continue;
             }
             const SeenNode now = seen_node(node, probe_from_mannequin, tissue);
             // Along the plane, or across it between two nodes.
             if (std::abs(now.off_mm) < std::min(kInPlaneMm, 0.5 * now.radius_mm)) consider(now);
-            if (before && (before->off_mm < 0) != (now.off_mm < 0))
-                consider(between(*before, now, before->off_mm / (before->off_mm - now.off_mm)));
+            if (joined && (before.off_mm < 0) != (now.off_mm < 0))
+                consider(between(before, now, before.off_mm / (before.off_mm - now.off_mm)));
             before = now;
+            joined = true;
         }
     }
     if (!widest) return std::nullopt;

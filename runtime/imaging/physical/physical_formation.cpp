@@ -180,6 +180,7 @@ class PhysicalFormation final : public ImageFormation {
             balls_of_frame(scene_, input.change, static_cast<int>(exercise_.findings.size()),
                            pushes ? &frame.volume_from_probe.rotation : nullptr, balls_);
             frame.balls = &balls_;
+            frame.air = input.change.air;
             add_tube(input.change.catheter, frame, count);
             add_line(input.change.wire, shape_of(kWire, 0.7, 0.2), 0, frame, count);
         }

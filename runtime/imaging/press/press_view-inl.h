@@ -267,6 +267,37 @@ inline bool may_close(const PressView& v, int k) {
     return v.field->closed_nodes().row[m];
 }
 
+// Adds to a stretch the shift by pools, whose surfaces it does not meet: it bends so little that it
+// is worked out for every `every`-th sample and is linear in between (PressView::pool_step).
+template <class D>
+HWY_NOINLINE void push_gently(
+    D d, const PressView& v, int line, int beam, int first, int rows, int every, PressChunk& out) {
+    const auto shift_at = [&](int row) HWY_ATTR {
+        const int at = std::min(row, rows - 1);
+        const ShiftLanes<D> base{hn::Load(d, out.along + (at + 1) * kPressBeams + beam),
+                                 hn::Load(d, out.side + std::max(at, 0) * kPressBeams + beam)};
+        ShiftLanes<D> shift = base;
+        pool_lanes(d, v, places_of_beams(d, v, line, first + row), shift);
+        return ShiftLanes<D>{hn::Sub(shift.along, base.along), hn::Sub(shift.side, base.side)};
+    };
+    ShiftLanes<D> above = shift_at(-1);
+    for (int knot = -1; knot < rows; knot += every) {
+        const ShiftLanes<D> below = shift_at(knot + every);
+        for (int step = 0; step < every && knot + step < rows; ++step) {
+            const int row = knot + step;
+            const auto part = hn::Set(d, static_cast<float>(step) / static_cast<float>(every));
+            const auto between = [&](auto a, auto b)
+                                     HWY_ATTR { return hn::Add(a, hn::Mul(part, hn::Sub(b, a))); };
+            float* along = out.along + (row + 1) * kPressBeams + beam;
+            hn::Store(hn::Add(hn::Load(d, along), between(above.along, below.along)), d, along);
+            if (row < 0) continue;
+            float* side = out.side + row * kPressBeams + beam;
+            hn::Store(hn::Add(hn::Load(d, side), between(above.side, below.side)), d, side);
+        }
+        above = below;
+    }
+}
+
 // Fills the lanes of one vector of beams. first_beam: first beam of the block; beam: the vector's
 // first within it; [first, first + rows): samples, all active.
 template <class D>
@@ -275,7 +306,9 @@ HWY_NOINLINE void press_chunk(
     const hn::RebindToSigned<D> di;
     const int line = first_beam + beam;
     const BetweenNodes<D> between(d, v, line);
-    const bool dents = v.dents(first_beam, first, rows), pushes = v.pushes(first_beam, first, rows);
+    const bool dents = v.dents(first_beam, first, rows);
+    const int every = v.pool_step(first_beam, first, rows);
+    const bool gently = every > 1 && !dents, pushes = every > 0 && !gently;
     out.first = first;
     for (int row = -1; row < rows; ++row) {
         const int k = std::max(first + row, 0);
@@ -283,7 +316,7 @@ HWY_NOINLINE void press_chunk(
         auto along = hn::Zero(d), side = hn::Zero(d);
         if (v.pressed && k < v.capacity) {
             along = between(v.along.data() + nodes);
-            if (row >= 0 || pushes) side = between(v.side.data() + nodes);
+            if (row >= 0 || every > 0) side = between(v.side.data() + nodes);
         }
         if (dents || pushes) {
             const PlaceLanes<D> places = places_of_beams(d, v, line, k);
@@ -298,6 +331,7 @@ HWY_NOINLINE void press_chunk(
         hn::Store(along, d, out.along + (row + 1) * kPressBeams + beam);
         if (row >= 0) hn::Store(side, d, out.side + row * kPressBeams + beam);
     }
+    if (gently) push_gently(d, v, line, beam, first, rows, every, out);
     out.any_closed = false;
     if (!v.pressed || !v.field->closed_nodes().any) return;
     for (int row = 0; row < rows; ++row) {

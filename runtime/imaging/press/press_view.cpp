@@ -226,13 +226,29 @@ bool PressView::dents(int line, int first, int rows) const {
     return norm(needle.tip - middle) < reach + kDentReachMm;
 }
 
-bool PressView::pushes(int line, int first, int rows) const {
-    if (field->pools().empty()) return false;
+int PressView::pool_step(int line, int first, int rows) const {
+    if (field->pools().empty()) return 0;
     Point3 middle;
-    const double reach = circle_around(line, first, rows, middle) + field->farthest_mm();
-    for (const SceneChange::Pool& pool : field->pools())
-        if (norm(pool.centre - middle) < reach + kPoolReaches * pool.radius_mm) return true;
-    return false;
+    const double reach = circle_around(line, first, rows, middle), mm = double{step_mm};
+    // The place that a pool moves has been moved by probe, needle and the pools before.
+    const double moved = field->farthest_mm();
+    bool any = false;
+    int step = 8;
+    for (const SceneChange::Pool& pool : field->pools()) {
+        const double radius = pool.radius_mm, away = norm(pool.centre - middle);
+        if (away >= reach + moved + kPoolReaches * radius) continue;
+        any = true;
+        // Within the pool the shift is linear. Outside it is (1 - k^3) R^3 / 3 r^2, whose second
+        // derivative d leaves a line over h by d h^2 / 8.
+        const double by_others = moved - (1 - kPoolCore) * radius;
+        for (; step > 1; step = step == 8 ? 4 : 1) {
+            const double h = step * mm, near = reach + h + by_others;
+            const double from = std::max(
+                radius, std::sqrt(std::sqrt(h * h * radius * radius * radius / (4 * kPoolOffMm))));
+            if (away + near <= radius || away - near >= from) break;
+        }
+    }
+    return any ? step : 0;
 }
 
 // Fills the planes for phased arrays, whose beams cross columns: every other sample of the nodes is

@@ -44,10 +44,14 @@ class PressView {
     // False where nothing moves in the samples [first, first + rows) of the beams [line, line +
     // kPressBeams).
     bool moves(int line, int first, int rows) const {
-        return first < active && (pressed || dents(line, first, rows) || pushes(line, first, rows));
+        return first < active &&
+               (pressed || dents(line, first, rows) || pool_step(line, first, rows) > 0);
     }
-    bool dents(int line, int first, int rows) const;   // a needle does
-    bool pushes(int line, int first, int rows) const;  // a pool does
+    bool dents(int line, int first, int rows) const;  // a needle does
+    // Over how many samples (1, 4 or 8) the shift by pools is linear to within kPoolOffMm; 0: no
+    // pool moves them.
+    static constexpr double kPoolOffMm = 0.02;
+    int pool_step(int line, int first, int rows) const;
 
     // The shift of one sample, k < active; line <= lines. by_probe: the probe's shift alone.
     struct Shift {

@@ -55,6 +55,22 @@ std::vector<fs::path> case_folders() {
     return folders;
 }
 
+std::vector<fs::path> files_beside_cases(const std::string& name) {
+    std::vector<fs::path> files;
+    for (const fs::path& folder : case_folders()) {
+        std::error_code failed;
+        std::vector<fs::path> found;
+        for (fs::directory_iterator it(folder, failed), end; !failed && it != end;
+             it.increment(failed)) {
+            const std::string called = it->path().filename().string();
+            if (called == name || called.ends_with("." + name)) found.push_back(it->path());
+        }
+        std::sort(found.begin(), found.end());
+        files.insert(files.end(), found.begin(), found.end());
+    }
+    return files;
+}
+
 std::vector<BundleEntry> find_bundles(const std::vector<std::string>& recent) {
     std::vector<BundleEntry> entries;
     std::set<std::string> seen;

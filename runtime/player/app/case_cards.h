@@ -24,6 +24,8 @@ struct BundleEntry {
 // Where cases are looked for: the data folders of the user and the system, the current folder and
 // its out/.
 std::vector<std::filesystem::path> case_folders();
+// The files there that are called `name`, or end in a point and it: "liver.course.toml".
+std::vector<std::filesystem::path> files_beside_cases(const std::string& name);
 
 // Those of `recent` that exist come first (bundles opened before, newest first), then those in
 // case_folders().

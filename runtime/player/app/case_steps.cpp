@@ -9,6 +9,7 @@
 
 #include "formats/bundle/case_bundle.h"
 #include "formats/files/load_save.h"
+#include "runtime/engine/auto_gain.h"
 #include "runtime/player/app/attempt_steps.h"
 #include "runtime/player/app/settings.h"
 #include "runtime/player/app/tracker_steps.h"
@@ -119,6 +120,8 @@ bool open_bundle(PlayerState& player,
     for (const Message& warning : loaded.open->warnings) notices.warning(warning);
     if (const std::string credits = attribution_of(*loaded.open->bundle); !credits.empty())
         notices.news(credits);
+    if (const CaseSignature& by = loaded.open->signature; by.fit == SignatureFit::fits)
+        notices.news({"Signed by {} (key {}).", {by.name, fingerprint_of(by.key)}});
     loaded.skin = std::make_unique<Skin>(*loaded.open->bundle);
     loaded.view3d->set_case(*loaded.open->bundle);
     choose_exercise(player, loaded, scan, *index);
@@ -269,35 +272,7 @@ void choose_preset(PlayerState& player,
 
 void adjust_gain(const ScanFrame& frame, ImageSettings& image) {
     if (frame.width_px <= 0 || frame.status != FrameStatus::rendered) return;
-    // Means of the eight depths where there is an echo at all; a level of 255 is the whole range.
-    std::array<double, 8> sum{}, count{};
-    for (int y = 0; y < frame.height_px; ++y) {
-        const double depth = (y - frame.layout.origin_y_px) * frame.layout.mm_per_px;
-        const int row = static_cast<int>(8 * depth / std::max(frame.depth_mm, 1.0));
-        if (depth < 0 || row > 7) continue;
-        for (int x = frame.width_px / 3; x < 2 * frame.width_px / 3; ++x) {
-            const int level = frame.pixels[static_cast<std::size_t>(y) * frame.width_px + x];
-            if (level < 30) continue;  // fluid, shadow and what a machine shows of no echo
-            sum[row] += level;
-            count[row] += 1;
-        }
-    }
-    constexpr double kWanted = 95;
-    const double db_per_level = image.dynamic_range_db / 255;
-    double all = 0, n = 0;
-    for (std::size_t i = 0; i < 8; ++i) {
-        all += sum[i];
-        n += count[i];
-    }
-    if (n < 1) return;
-    const double middle = all / n;
-    image.gain_db =
-        std::clamp(image.gain_db + std::round((kWanted - middle) * db_per_level), -30.0, 30.0);
-    for (std::size_t i = 0; i < 8; ++i) {
-        if (count[i] < 50) continue;
-        const double by = (middle - sum[i] / count[i]) * db_per_level;
-        image.tgc_db[i] = std::clamp(std::round(image.tgc_db[i] + 0.5 * by), -20.0, 20.0);
-    }
+    adjust_gain(frame.pixels, frame.width_px, frame.layout, frame.depth_mm, image);
 }
 
 void check_bundle(CaseState& loaded, Notices& notices) {

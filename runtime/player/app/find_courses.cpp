@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <utility>
 
 #include "formats/files/atomic_file.h"
 #include "runtime/player/app/case_cards.h"
@@ -15,18 +16,7 @@ namespace fs = std::filesystem;
 std::vector<Course> find_courses(const std::string& given, Notices& notices) {
     std::vector<fs::path> files;
     if (!given.empty()) files.emplace_back(given);
-    for (const fs::path& folder : case_folders()) {
-        std::error_code failed;
-        std::vector<fs::path> found;
-        for (fs::directory_iterator it(folder, failed), end; !failed && it != end;
-             it.increment(failed)) {
-            const std::string name = it->path().filename().string();
-            if (name == "course.toml" || name.ends_with(".course.toml"))
-                found.push_back(it->path());
-        }
-        std::sort(found.begin(), found.end());
-        files.insert(files.end(), found.begin(), found.end());
-    }
+    for (fs::path& file : files_beside_cases("course.toml")) files.push_back(std::move(file));
     std::vector<Course> courses;
     for (const fs::path& file : files) {
         const auto text = read_text_file(file.string());

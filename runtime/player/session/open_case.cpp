@@ -48,10 +48,19 @@ Result<std::unique_ptr<OpenCase>> open_case(const std::string& path) {
     auto open = std::make_unique<OpenCase>();
     open->path = path;
     open->bundle = std::move(bundle);
+    open->signature = signature_of(open->bundle.bytes());
     CaseExercises found = exercises_of(*open->bundle, path);
     open->exercises = std::move(found.exercises);
     open->warnings = std::move(found.warnings);
     open->exercise_digests = std::move(found.digests);
+    const CaseSignature& by = open->signature;
+    if (by.fit == SignatureFit::differs)
+        open->warnings.push_back(
+            {"The signature of {} (key {}) does not fit: the case was changed since, or the "
+             "signature is that of another.",
+             {by.name, fingerprint_of(by.key)}});
+    if (by.fit == SignatureFit::unreadable)
+        open->warnings.push_back({"The case has a signature that this program cannot read.", {}});
     for (const Exercise& exercise : open->exercises)
         open->texts.push_back(texts_of_exercise(*open->bundle, exercise.name));
     add_own_exercises(*open);

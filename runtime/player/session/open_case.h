@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "formats/bundle/case_bundle.h"
+#include "formats/bundle/signature.h"
 #include "formats/exercise/exercise.h"
 #include "formats/exercise/exercise_texts.h"
 #include "runtime/engine/scan_engine.h"
@@ -22,7 +23,8 @@ namespace sonocase::runtime::inline player_session {
 struct OpenCase {
     std::string path;
     StreamedBundle bundle;
-    std::vector<Exercise> exercises;                   // at least one: without any, a free scan
+    CaseSignature signature;          // one that does not fit is among the warnings as well
+    std::vector<Exercise> exercises;  // at least one: without any, a free scan
     std::vector<std::string> exercise_digests;         // of their TOML; may be shorter
     std::vector<std::string> exercise_files;           // empty name: in the bundle; may be shorter
     std::vector<std::vector<ExerciseTexts>> texts;     // other languages'; may be shorter

@@ -92,8 +92,12 @@ CineRequest draw_cine_bar(
         style.key = "Space";
         style.tip = "Holds the picture; the last 20 s can be looked through";
         const char* words = controls.frozen ? "Live" : "Freeze";
-        request.toggle_freeze =
-            ui.button("freeze", rest.take_left(narrow ? 120 : 170, 8), tr(words), style);
+        // The longer of the two words with its key's cap, so that the bar stays as it is.
+        const float wide =
+            std::max(ui.width(tr("Live"), Type::bold), ui.width(tr("Freeze"), Type::body)) +
+            ui.width(tr("Space"), Type::small) + 74;
+        request.toggle_freeze = ui.button(
+            "freeze", rest.take_left(narrow ? 120 : std::max(wide, 170.0f), 8), tr(words), style);
         draw_kept(ui, rest, controls, cine, input);
     } else {
         draw_time_line(ui, rest, *input.replay);

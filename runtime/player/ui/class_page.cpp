@@ -183,7 +183,7 @@ void draw_curves(const ClassPage& page,
     if (room.h < 60) return;
     // Room for the figures of both axes.
     const Box plot{room.x + 34, room.y + 8, room.w - 50, room.h - 32};
-    double max_mm = 5;
+    double max_mm = 10;
     std::size_t longest = 2;
     std::vector<std::pair<std::string, std::vector<double>>> curves;
     for (const std::string& trainee : records.trainees) {
@@ -191,7 +191,7 @@ void draw_curves(const ClassPage& page,
         longest = std::max(longest, curves.back().second.size());
         for (const double mm : curves.back().second) max_mm = std::max(max_mm, mm);
     }
-    max_mm = 5 * std::ceil(max_mm / 5);
+    max_mm = 10 * std::ceil(max_mm / 10);  // its half has no fraction
     const auto x_of = [&](std::size_t i) {
         return plot.x + plot.w * static_cast<float>(i) / static_cast<float>(longest - 1);
     };
@@ -320,7 +320,7 @@ void draw_files(PlayerState& player, ClassPage& page, Ui& ui, Box row) {
     style.tip = "Removes this trainee's attempts and recordings from this machine";
     const bool asked = player.now_s - page.remove_asked_s < 5;
     const std::string words =
-        std::string(tr(asked ? "Really remove" : "Remove")) + " " + page.trainee;
+        filled(tr(asked ? "Really remove %s?" : "Remove %s"), page.trainee.c_str());
     const float wide = 60 + ui.width(words, Type::body);
     if (wide < row.w && ui.button("remove", row.take_right(wide), words, style)) {
         if (asked) {

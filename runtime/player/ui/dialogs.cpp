@@ -26,11 +26,8 @@ namespace sonocase::runtime::inline player_ui {
 Box begin_page_dialog(Ui& ui, Screen& screen, const char* title, float width, float height);
 
 void draw_effects_panel(const ScanFrame& frame, float s) {
-    heading("Effects");
-    const std::string total = filled(tr("%.2f ms per frame"), frame.frame_ms);
-    ImGui::SameLine(ImGui::GetWindowContentRegionMax().x - ImGui::CalcTextSize(total.c_str()).x);
-    ImGui::TextDisabled("%s", total.c_str());
     ImGui::PushFont(fonts().small);
+    ImGui::TextUnformatted(filled(tr("%.2f ms per frame"), frame.frame_ms).c_str());
     const Renderer::Accuracy& accuracy = frame.accuracy;
     const std::string lines = filled("%s, %d x %d", tr(accuracy.level == 0 ? "full" : "reduced"),
                                      accuracy.scanlines, accuracy.samples);

@@ -165,6 +165,7 @@ struct SetupPageInput {
     const Calibrations& calibrations;
     const ImageTexture& picture;  // of the newest frame, for the last step
     int width_px, height_px;      // its size
+    bool over_result;             // opened over an attempt's result: it leads back there
 };
 struct SetupRequest {
     bool save = false, close = false;

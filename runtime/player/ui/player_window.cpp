@@ -62,7 +62,8 @@ void PlayerWindow::show_setup(const TrackerHealth& tracker) {
                          .calibrations = set_up.calibrations,
                          .picture = *view_.display.texture,
                          .width_px = loaded_.frame().width_px,
-                         .height_px = loaded_.frame().height_px});
+                         .height_px = loaded_.frame().height_px,
+                         .over_result = view_.screen.page == Page::after});
     if (wanted.role)
         give_role(player_, loaded_, scan_.tracker, tracker.sensors, wanted.role->first,
                   wanted.role->second);
@@ -95,7 +96,11 @@ void PlayerWindow::draw_page(const TrackerHealth& tracker) {
             break;
         case Page::after:
             note_exam_result(scan_.training);
-            draw_after_page(session, player_.notices, screen, ui_, requests_);
+            if (screen.show_setup) {
+                show_setup(tracker);
+            } else {
+                draw_after_page(session, player_.notices, screen, ui_, requests_);
+            }
             break;
         case Page::course:
             draw_course_page(player_.progress, player_.notices, view_.chooser, view_.course_page,

@@ -58,6 +58,11 @@ void keep_measurements(const CaseState& loaded, PictureTools& tools) {
     tools.measurements.clear();
 }
 
+// Pages with a picture; the set-up has one also where it opens over an attempt's result.
+bool shows_picture(const Screen& screen) {
+    return screen.page == Page::scan || (screen.page == Page::after && screen.show_setup);
+}
+
 }  // namespace
 
 // When pictures begin, and how fast they follow each other.
@@ -213,7 +218,7 @@ Stillness PlayerWindow::stillness(const PictureClock& clock) const {
         !scan_.console.clip && !scan_.training.attempt && scan_.tracker.mouse && shown_ > 0 &&
         shown_frame_ == loaded_.frame().number && steady_seconds() - clock.input_s() > kFollows;
     Stillness now;
-    now.scanning = (view_.screen.page == Page::scan && !frozen) || script_.active() ||
+    now.scanning = (shows_picture(view_.screen) && !frozen) || script_.active() ||
                    player_.arguments.frames > 0;
     now.key_held = view_.display.window->key_held();
     now.loading = (view_.chooser.cards && view_.chooser.cards->busy()) || loaded_.view3d->busy();

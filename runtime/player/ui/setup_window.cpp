@@ -545,8 +545,9 @@ SetupRequest draw_setup_page(Ui& ui,
     const Box window = ui.window();
     const PageLayout layout = page_layout(window.w, window.h);
     Box bar = layout.bar, content = layout.content;
-    request.close =
-        back_button(ui, bar, "scanning", tr("Back to scanning"), "The set-up stays as it is (F3)");
+    request.close = back_button(ui, bar, "scanning",
+                                tr(input.over_result ? "Back to the result" : "Back to scanning"),
+                                "The set-up stays as it is (F3)");
     if (!show_notice(notices, ui, bar)) ui.text(bar, tr("Set-up"), Type::heading);
     request.save =
         draw_foot(ui, content.take_bottom(layout.columns == 1 ? 48 : 56, 12), guide, input);

@@ -3,9 +3,11 @@
 // The tracker: which one, how it does, its sensors and their calibrations.
 #include <imgui.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <map>
 
+#include "runtime/player/app/case_cards.h"
 #include "runtime/player/ui/panels.h"
 #include "runtime/player/ui/parts/panel_parts.h"
 #include "runtime/player/words/words.h"
@@ -82,34 +84,106 @@ void draw_pace(PacedTracker& paced) {
     if (ImGui::IsItemClicked(1)) paced.set_speed(1);
 }
 
+// A list that opens, its rows as far apart as fingers need.
+bool begin_list(const char* id, const char* shown) {
+    ImGui::SetNextItemWidth(-1);
+    const ImGuiStyle& style = ImGui::GetStyle();
+    ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {style.ItemSpacing.x, style.FramePadding.y});
+    if (ImGui::BeginCombo(id, shown, ImGuiComboFlags_HeightLargest)) return true;
+    ImGui::PopStyleVar();
+    return false;
+}
+void end_list() {
+    ImGui::EndCombo();
+    ImGui::PopStyleVar();
+}
+
+// A live camera and the file of its lens, of a specification: "camera:0,camera.json".
+struct LiveCamera {
+    std::string device;  // "camera:0", "camera"
+    std::string lens;    // empty: not known
+    std::string spec() const {
+        if (lens.empty()) return device;
+        return device + (device.find(':') == std::string::npos ? ":" : ",") + lens;
+    }
+};
+std::optional<LiveCamera> live_camera(const std::string& spec) {
+    const std::string kind = "camera";
+    if (spec == kind) return LiveCamera{spec, ""};
+    if (spec.rfind(kind + ":", 0) != 0) return {};
+    const std::string argument = spec.substr(kind.size() + 1);
+    const std::size_t digits = std::min(argument.find_first_not_of("0123456789"), argument.size());
+    if (digits == argument.size()) return LiveCamera{spec, ""};
+    if (digits > 0 && argument[digits] == ',')
+        return LiveCamera{kind + ":" + argument.substr(0, digits), argument.substr(digits + 1)};
+    if (argument.ends_with(".json") && argument.find(',') == std::string::npos)
+        return LiveCamera{kind, argument};
+    return {};  // a video
+}
+
+// A lens was measured of one camera: its file comes back with that camera and with no other.
+std::map<std::string, std::string>& lens_of_camera() {
+    static std::map<std::string, std::string> files;
+    return files;
+}
+
+// The lens of the camera in use: one of the files beside the cases, or not known.
+std::optional<std::string> draw_lens(const std::string& spec) {
+    const std::optional<LiveCamera> camera = live_camera(spec);
+    if (!camera) return {};
+    if (!camera->lens.empty()) lens_of_camera()[camera->device] = camera->lens;
+    std::optional<std::string> chosen;
+    const auto choose = [&](const std::string& lens) {
+        lens_of_camera()[camera->device] = lens;
+        chosen = LiveCamera{camera->device, lens}.spec();
+    };
+    small_dim(tr("Lens and markers, as measured"));
+    const char* unknown = tr("Not measured: 65 degrees across");
+    if (!begin_list("##lens", camera->lens.empty() ? unknown : camera->lens.c_str())) return chosen;
+    static std::vector<std::string> files;
+    if (ImGui::IsWindowAppearing()) {
+        files.clear();
+        for (const auto& file : files_beside_cases("camera.json"))
+            files.push_back(file.lexically_normal().string());
+    }
+    if (ImGui::Selectable(unknown, camera->lens.empty())) choose("");
+    for (const std::string& file : files)
+        if (ImGui::Selectable(file.c_str(), camera->lens == file)) choose(file);
+    if (files.empty()) ImGui::TextDisabled("%s", tr("No camera.json lies beside the cases"));
+    end_list();
+    if (chosen == spec) chosen.reset();
+    return chosen;
+}
+
 std::optional<std::string> draw_choice(const std::string& spec, const std::vector<Sweep>& sweeps) {
     std::optional<std::string> chosen;
-    std::string shown = spec;
-    for (const TrackerKind& kind : tracker_kinds()) {
-        if (kind.name && spec == kind.panel_spec) shown = tr(kind.name);
-    }
-    ImGui::SetNextItemWidth(-1);
-    if (!ImGui::BeginCombo("##tracker", shown.c_str())) return chosen;
-    // Devices are looked for when the list opens.
+    // Devices are looked for when the panel or its list opens.
     static std::vector<std::vector<TrackerChoice>> devices;
-    // A lens was measured of one camera: its file comes back with that camera and with no other.
-    static std::map<std::string, std::string> with_file;
-    if (const std::size_t comma = spec.find(','); comma != std::string::npos)
-        with_file[spec.substr(0, comma)] = spec;
-    if (ImGui::IsWindowAppearing() || devices.size() != tracker_kinds().size()) {
+    const auto look = [&] {
         devices.clear();
         for (const TrackerKind& kind : tracker_kinds())
             devices.push_back(kind.choices ? kind.choices() : std::vector<TrackerChoice>());
+    };
+    if (ImGui::IsWindowAppearing() || devices.empty()) look();
+    const std::optional<LiveCamera> camera = live_camera(spec);
+    std::string shown = camera ? camera->device : spec;
+    for (std::size_t k = 0; k < tracker_kinds().size(); ++k) {
+        const TrackerKind& kind = tracker_kinds()[k];
+        if (kind.name && spec == kind.panel_spec) shown = tr(kind.name);
+        for (const TrackerChoice& device : devices[k])
+            if (shown == device.spec) shown = device.name;
     }
+    if (!begin_list("##tracker", shown.c_str())) return chosen;
+    if (ImGui::IsWindowAppearing()) look();
     for (std::size_t k = 0; k < tracker_kinds().size(); ++k) {
         const TrackerKind& kind = tracker_kinds()[k];
         if (kind.name && ImGui::Selectable(tr(kind.name), spec == kind.panel_spec))
             chosen = kind.panel_spec;
         for (const TrackerChoice& device : devices[k]) {
-            const auto known = with_file.find(device.spec);
-            const std::string& wanted = known == with_file.end() ? device.spec : known->second;
+            const std::string wanted =
+                LiveCamera{device.spec, lens_of_camera()[device.spec]}.spec();
             if (ImGui::Selectable(("    " + device.name + "##" + device.spec).c_str(),
-                                  spec == wanted))
+                                  camera && camera->device == device.spec))
                 chosen = wanted;
         }
         if (kind.choices && devices[k].empty())
@@ -120,7 +194,7 @@ std::optional<std::string> draw_choice(const std::string& spec, const std::vecto
         if (ImGui::Selectable((tr("Script: ") + sweep.name).c_str(), spec == sweep_spec))
             chosen = sweep_spec;
     }
-    ImGui::EndCombo();
+    end_list();
     return chosen;
 }
 
@@ -178,6 +252,7 @@ void draw_calibrations(const Calibrations& calibrations, bool in_mannequin) {
 
 std::optional<std::string> draw_tracker_panel(const TrackerPanelInput& input) {
     std::optional<std::string> chosen = draw_choice(input.spec, input.sweeps);
+    if (const auto lens = draw_lens(input.spec)) chosen = lens;
     if (const auto address = draw_address(input.spec)) chosen = address;
     if (input.paced) draw_pace(*input.paced);
     draw_health(input.health);

@@ -53,6 +53,14 @@ def common_classes(palettes, classes=None):
                            for case, palette in palettes.items()}
 
 
+def in_classes(labels, class_of):
+    """A plane of labels as classes, by an array of common_classes()."""
+    if labels.dtype != np.uint8 or class_of.dtype != np.uint8:
+        return class_of[labels]
+    table = class_of.tobytes().ljust(256, b"\0")  # a quarter of the time of an index by an array
+    return np.frombuffer(bytearray(np.ascontiguousarray(labels)).translate(table), np.uint8).reshape(labels.shape)
+
+
 class DataSet:
     """The frames of a data set, in the order of their numbers.
 
@@ -94,7 +102,7 @@ class DataSet:
         record = self.records[i]
         frame = {plane: self._plane(record, plane) for plane in self.planes}
         if "labels" in frame:
-            frame["labels"] = self._class_of[record["case"]][frame["labels"]]
+            frame["labels"] = in_classes(frame["labels"], self._class_of[record["case"]])
         if self.facts:
             frame["facts"] = record
         return frame

@@ -30,7 +30,7 @@ import numpy as np
 from . import _core
 from . import pose as _pose
 from ._core import Case, Error, Probe, Renderer
-from .data import common_classes
+from .data import common_classes, in_classes
 
 # Keys of a probe, and of a needle beside where it goes, with their limits: those of an exercise's file.
 PROBE = {"shape": None, **_core._PROBE_LIMITS}
@@ -273,6 +273,8 @@ def _plain(value):
     """As JSON has it: lists for arrays, null for what is not a number."""
     if isinstance(value, dict):
         return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray) and np.isfinite(value).all():
+        return value.tolist()
     if isinstance(value, (list, tuple, np.ndarray)):
         return [_plain(v) for v in value]
     if isinstance(value, np.generic):
@@ -361,7 +363,7 @@ class DrawnFrames:
         self.records = _Records(self)
 
     def __getstate__(self):  # workers open their own cases
-        return {k: v for k, v in self.__dict__.items() if k not in ("_cases", "_last", "records")}
+        return {k: v for k, v in self.__dict__.items() if k not in ("_cases", "_last", "_stands", "records")}
 
     def __setstate__(self, state):
         self.__dict__.update(state)
@@ -396,6 +398,9 @@ class DrawnFrames:
                   "seed": self.seed}
         renderer = renderer_of(common, case)
         common.update(mm_per_px=renderer.mm_per_px, origin_px=list(renderer.origin_px))
+        exercise = renderer.exercise
+        self._stands = _Choice("stand", {"one_of": [
+            exercise.start_pose, *(p for name in exercise.sweeps for p in exercise.sweep_poses(name))]})
         self._last = (number, (common, renderer))
         return self._last[1]
 
@@ -404,8 +409,7 @@ class DrawnFrames:
         case, exercise = self._opened(common["case"]), renderer.exercise
         drawn = {key: c.draw(self.seed, i) for key, c in self.domain.sample.items()}
         slide = np.array([self.domain.sample["pose.slide_mm"].draw(self.seed, i, f".{a}") for a in "xy"])
-        stands = [exercise.start_pose, *(p for name in exercise.sweeps for p in exercise.sweep_poses(name))]
-        stand = _Choice("stand", {"one_of": stands}).draw(self.seed, i)
+        stand = self._stands.draw(self.seed, i)
         for part in (1, 0.5, 0):  # off the body: nearer to where the exercise stands
             near = stand[:3, 3] + stand[:3, :2] @ (part * slide)
             pose = _pose.on_skin(case, near, stand[:3, 2], stand[:3, 0])
@@ -437,7 +441,7 @@ class DrawnFrames:
             planes, facts = renderer.truth(self.planes[1:])
             frame.update({plane: getattr(planes, plane) for plane in self.planes[1:]})
             if "labels" in frame:
-                frame["labels"] = self._class_of[record["case"]][frame["labels"]]
+                frame["labels"] = in_classes(frame["labels"], self._class_of[record["case"]])
             if self.facts:
                 frame["facts"] = {**record, "truth": _plain(facts)}
         return frame

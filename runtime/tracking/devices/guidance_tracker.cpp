@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <thread>
 
 #include "runtime/tracking/devices/guidance_protocol.h"
 #include "runtime/tracking/devices/usb_tracker.h"
@@ -82,7 +81,7 @@ Status GuidanceDriver::start(UsbPipe& pipe, const UsbTrackerOptions& options, st
     pipe.read(buffer_, got, 0.05);  // sent for an earlier session
     const std::uint8_t configure[] = {0x50, 0x32, 0x01};
     if (pipe.write(configure, kTimeout) != UsbOutcome::ok) return silent;
-    std::this_thread::sleep_for(std::chrono::milliseconds(600));
+    wait_s(0.6);
     const std::uint8_t range[] = {0x4F, 0x03};
     if (ask(pipe, range, 2) != UsbOutcome::ok) return silent;
     range_in_ = (answer_[0] | answer_[1] << 8) == 1 ? 72 : 36;
@@ -130,7 +129,8 @@ Status GuidanceDriver::start(UsbPipe& pipe, const UsbTrackerOptions& options, st
 }
 
 bool GuidanceDriver::read(UsbPipe& pipe, TrackerReading& reading, UsbOutcome& outcome) {
-    std::this_thread::sleep_until(due_);
+    const double early_s = std::chrono::duration<double>(due_ - Clock::now()).count();
+    if (early_s > 0) wait_s(early_s);
     due_ = std::max(due_ + period_, Clock::now());
     reading.sensor_count = 0;
     reading.sensors.fill({});

@@ -128,7 +128,9 @@ std::vector<TrackerChoice> cameras() {
 
 template <std::unique_ptr<UsbDriver> (*make_driver)()>
 Made make_usb(const std::string&, const TrackerContext& context) {
-    return Made(std::make_unique<UsbTracker>(make_driver(), context.clock));
+    auto tracker = std::make_unique<UsbTracker>(make_driver(), context.clock);
+    tracker->start();
+    return Made(std::move(tracker));
 }
 
 constexpr auto kNone = TrackerKind::Argument::none;

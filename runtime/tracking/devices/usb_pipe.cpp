@@ -5,7 +5,9 @@
 #include <libusb.h>
 
 #include <cassert>
+#include <chrono>
 #include <cstdio>
+#include <thread>
 #include <utility>
 
 namespace sonocase::runtime::inline tracking_devices {
@@ -55,6 +57,10 @@ void find_endpoints(libusb_device* device, std::uint8_t& in, std::uint8_t& out, 
 }
 
 }  // namespace
+
+void wait_s(double seconds) {
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+}
 
 struct UsbPipe::Impl {
     libusb_device_handle* handle = nullptr;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// One claimed USB device with a bulk endpoint each way. libusb stays in the .cpp file.
+// One claimed USB device with a bulk endpoint each way. libusb stays in the .cpp file; on a page
+// the same functions are those of runtime/web/program/usb_exports.cpp.
 #pragma once
 
 #include <cstdint>
@@ -20,6 +21,9 @@ struct UsbId {
     std::uint8_t endpoint_in = 0,
                  endpoint_out = 0;  // 0: the first bulk ones that the device describes
 };
+
+// Waits as reading and writing do: a thread sleeps, a page lets others run.
+void wait_s(double seconds);
 
 enum class UsbOutcome { ok, timeout, stalled, gone, failed };
 

@@ -3,7 +3,6 @@
 #include "runtime/tracking/devices/usb_tracker.h"
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 namespace sonocase::runtime::inline tracking_devices {
@@ -19,12 +18,15 @@ UsbTracker::UsbTracker(std::unique_ptr<UsbDriver> driver,
                        UsbTrackerOptions options)
     : driver_(std::move(driver)), clock_(std::move(clock)), options_(options) {
     health_.device = driver_->ids().front().name;
-    thread_ = std::thread([this] { run(); });
 }
 
 UsbTracker::~UsbTracker() {
-    stop_ = true;
-    thread_.join();
+    stop();
+    if (thread_.joinable()) thread_.join();
+}
+
+void UsbTracker::start() {
+    thread_ = std::thread([this] { run(); });
 }
 
 bool UsbTracker::poll(double, TrackerReading& reading) {
@@ -51,9 +53,8 @@ void UsbTracker::set_health(TrackerPhase phase, const Message& message) {
 
 void UsbTracker::pause(double seconds) {
     // In short sleeps, so that the destructor does not wait long.
-    for (double slept = 0; slept < seconds && !stop_; slept += 0.02) {
-        std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    }
+    constexpr double kShort = 0.02;
+    for (double slept = 0; slept < seconds && !stop_; slept += kShort) wait_s(kShort);
 }
 
 void UsbTracker::run() {

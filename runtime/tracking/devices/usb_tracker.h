@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// A USB tracker on a thread of its own: waits for the device, starts it, hands over readings, and
-// begins again after it was unplugged. What differs between makers is a UsbDriver.
+// A USB tracker: waits for the device, starts it, hands over readings, and begins again after it
+// was unplugged; on a thread of its own, or on a page between its frames. What differs between
+// makers is a UsbDriver.
 #pragma once
 
 #include <atomic>
@@ -49,13 +50,17 @@ class UsbTracker final : public Tracker {
                SessionClock clock,
                UsbTrackerOptions options = {});
     ~UsbTracker() override;
+    // run() on a thread of its own, until this is destroyed.
+    void start();
+    // Does all that, until stop(). A page calls it itself: its pipe's waits let others run.
+    void run();
+    void stop() { stop_ = true; }
     bool poll(double now_s, TrackerReading& reading) override;
     TrackerHealth health() const override;
     void set_wake(std::function<void()> wake) override;
     bool is_device() const override { return true; }
 
   private:
-    void run();
     void stream(UsbPipe& pipe);
     void set_health(TrackerPhase phase, const Message& message);
     void pause(double seconds);

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <thread>
 
 #include "runtime/tracking/devices/byte_stream.h"
 #include "runtime/tracking/devices/usb_tracker.h"
@@ -79,7 +78,7 @@ Status ViperDriver::ask(UsbPipe& pipe,
             if (outcome == UsbOutcome::stalled) pipe.clear_halt();
             if (outcome == UsbOutcome::gone || outcome == UsbOutcome::failed) return silent;
         }
-        if (not_ready) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        if (not_ready) wait_s(0.1);
     }
     return silent;
 }

@@ -10,6 +10,7 @@ import {inside_page, load_list, open_bytes} from './source.js';
 import {begin_words, choose_language, exercise_texts, language_in_use, languages, missing_words, t} from './words.js';
 
 const $ = (id) => document.getElementById(id);
+const kBeforeS = 2;  // a moment is shown from this long before it, as in the window
 const kPages = ['start', 'course', 'scan', 'after', 'scores'];
 
 class App {
@@ -37,6 +38,8 @@ class App {
         click('to-cases', () => this.to_cases());
         click('after-cases', () => this.show_first());
         click('again', () => this.choose_exercise(this.exercise));
+        click('replay', () => this.show_moment(0, true));
+        click('to-results', () => this.show('after'));
         click('save-recording', () => this.save(this.attempt, 'recording'));
         click('save-scores', () => this.save(this.attempt, 'scores'));
         click('loading-stop', () => this.loading?.abort());
@@ -426,6 +429,7 @@ class App {
             return row([t(one.title), one.value, needed, verdict], one.reached ? 'pass' : 'fail');
         }));
         this.show_checklist(score.procedure, exercise);
+        this.show_trend(result.trend);
         $('measures').replaceChildren(...result.measures.map((one) => row([t(one.title), one.value])));
         $('next').hidden = this.description.exercises.length < 2;
         const {exercises} = this.description, next = exercise_texts(exercises[(this.exercise + 1) % exercises.length]);
@@ -433,6 +437,29 @@ class App {
         $('after-notice').textContent = '';
         this.show('after');
         $('verdict').focus();
+    }
+    // How the attempts at this exercise went, this one last; the mark as a dashed line.
+    show_trend(trend) {
+        const {case_name, exercise, started_ms} = this.attempt, before = this.attempts_of(case_name, exercise);
+        const values = trend ? [...before.filter((one) => one.started_ms !== started_ms), this.attempt]
+            .map((one) => JSON.parse(one.score_text).metrics?.[trend.metric]).filter(Number.isFinite) : [];
+        $('trend-box').hidden = values.length < 2;
+        if (values.length < 2) return;
+        $('trend-title').textContent = t(trend.title);
+        const top = Math.max(...values, trend.limit ?? 0) || 1;
+        const x = (n) => 12 + 296 * n / (values.length - 1), y = (value) => 96 - 84 * value / top;
+        const draw = (name, properties, text = '') => {
+            const one = document.createElementNS('http://www.w3.org/2000/svg', name);
+            for (const [key, value] of Object.entries(properties)) one.setAttribute(key, value);
+            one.textContent = text;
+            return one;
+        };
+        $('trend').replaceChildren(
+            ...trend.limit === null ? [] : [draw('path', {class: 'limit', d: `M12 ${y(trend.limit)}H308`})],
+            draw('path', {d: `M${values.map((value, n) => `${x(n)} ${y(value)}`).join('L')}`}),
+            ...values.map((value, n) => draw('circle', {cx: x(n), cy: y(value), r: n === values.length - 1 ? 5 : 3})),
+            draw('text', {x: 12, y: 116}, '1'), draw('text', {x: 308, y: 116, 'text-anchor': 'end'}, values.length));
+        $('trend').setAttribute('aria-label', `${t('Your attempts')}: ${values.map((value) => value.toFixed(2)).join(', ')}`);
     }
     // The list of a procedure, each item with its moment in the recording.
     show_checklist(list, exercise) {
@@ -442,8 +469,22 @@ class App {
         $('checklist-words').textContent = [t('Checklist: %d of %d, %.0f points of %.0f, %.0f needed', ticked, list.items.length, list.points, list.max_points, list.cut),
             list.stray_acts > list.stray_acts_at_most ? t('%d acts where no step asks for them; at most %d pass.', list.stray_acts, list.stray_acts_at_most) : '',
             ...list.complications.map((one) => `${t(this.description.complications[one.name] ?? one.name)} ${minutes(one.time_s)}`)].filter((words) => words).join(' · ');
-        $('checklist').replaceChildren(...list.items.map((item) => row([item_title(exercise, item), item.time_s === null ? '–' : minutes(item.time_s),
-            item.critical ? t('critical') : '', item.ticked ? `✓ ${t('done')}` : `✗ ${missed_words(item.why)}`], item.ticked ? 'pass' : 'fail')));
+        $('checklist').replaceChildren(...list.items.map((item) => {
+            const line = row([item_title(exercise, item), item.time_s === null ? '–' : '', item.critical ? t('critical') : '',
+                item.ticked ? `✓ ${t('done')}` : `✗ ${missed_words(item.why)}`], item.ticked ? 'pass' : 'fail');
+            if (item.time_s === null) return line;
+            const moment = element('button', minutes(item.time_s), {type: 'button', title: t('Shows this moment in the replay')});
+            moment.addEventListener('click', () => this.show_moment(Math.max(item.time_s - kBeforeS, 0)));
+            line.children[1].append(moment);
+            return line;
+        }));
+    }
+    // The pictures of the attempt that ended last, held at a time of it.
+    show_moment(time_s, plays = false) {
+        const back = this.core.calls.look_at_attempt(time_s);
+        if (back < 0) return;
+        this.show('scan');
+        this.scan.look_at_attempt(back, plays);
     }
     save(attempt, what) {
         const name = file_name(attempt);

@@ -3,22 +3,13 @@
 // Probe and needle of printed markers before this device's camera (docs/cardboard.md). Fetched when the camera is chosen;
 // pictures go to a worker of this page and nowhere else.
 import {PlainError, has_simd} from './core.js';
+import {PlacedTracker} from './placed_tracker.js';
 import {element} from './scan.js';
 import {t} from './words.js';
 
 const kCameraSize = {width: {ideal: 1280}, height: {ideal: 720}, frameRate: {ideal: 30}};
 const kMissed = 5;  // pictures, of a probe that is said to be lost
 const kLongestAgeMs = 500;  // of a picture, by the camera's own clock; more is another clock
-
-// Products and inverses of poses: 16 numbers, rows.
-export function pose_times(a, b) {
-    return Array.from({length: 16}, (unused, n) => [0, 1, 2, 3].reduce((sum, k) => sum + a[(n & ~3) + k] * b[4 * k + (n & 3)], 0));
-}
-export function pose_inverse(a) {
-    const out = [a[0], a[4], a[8], 0, a[1], a[5], a[9], 0, a[2], a[6], a[10], 0, 0, 0, 0, 1];
-    for (let r = 0; r < 3; ++r) out[4 * r + 3] = -(out[4 * r] * a[3] + out[4 * r + 1] * a[7] + out[4 * r + 2] * a[11]);
-    return out;
-}
 
 // Why there is no picture, in words. error: of getUserMedia.
 export function words_of_camera(error) {
@@ -32,10 +23,11 @@ export function words_of_camera(error) {
     }
 }
 
-export class CameraTracker {
+export class CameraTracker extends PlacedTracker {
     // room: the element to fill. ended(): it stops by itself, after words.
     constructor(scan, room, ended) {
-        Object.assign(this, {scan, room, ended, newest: null, placed: null, setup: null, setup_words: '', said_above: '', missed: 0, pictures: 0});
+        super(scan, room, ended, 'camera');
+        Object.assign(this, {setup: null, setup_words: '', pictures: 0});
         this.make_room();
     }
 
@@ -45,35 +37,8 @@ export class CameraTracker {
         this.choice = element('select', '', {hidden: true});
         this.choice.setAttribute('aria-label', t('Camera in use'));
         this.choice.addEventListener('change', () => this.use_again(this.choice.value));
-        this.words = element('p', '', {className: 'second'});
-        this.words.setAttribute('role', 'status');
-        const list = element('dl', '', {className: 'values'});
-        const [probe, needle, delay] = [t('Probe'), t('Needle'), t('Prediction')].map((name) => {
-            const value = element('dd', '–');
-            list.append(element('dt', name), value);
-            return value;
-        });
-        Object.assign(this, {states: [probe, needle], delay});
-        const place = element('button', t('Probe is at the start'), {type: 'button', title: t('Hold the probe where the exercise begins; the picture goes there')});
-        place.addEventListener('click', () => this.place());
-        const file = element('input', '', {type: 'file', accept: '.json', hidden: true});
-        file.setAttribute('aria-label', t('Camera file'));
-        file.addEventListener('change', () => this.use_file(file.files[0]));
-        const ask = element('button', t('Camera file'), {type: 'button', title: t('Lens and markers as sonocase calibrate has measured them')});
-        ask.addEventListener('click', () => file.click());
-        const row = element('div', '', {className: 'row'});
-        row.append(place, ask, file);
-        this.room.replaceChildren(this.video, list, this.words, row, this.choice);
+        this.room.replaceChildren(this.video, ...this.common_parts(t('Prediction'), t('Camera file'), t('Lens and markers as sonocase calibrate has measured them')), this.choice);
     }
-    say(words) { if (this.words.textContent !== words) this.words.textContent = words; }
-    // Above the picture, where a trainee looks.
-    say_above(words) {
-        if (words === this.said_above) return;
-        this.said_above = words;
-        this.scan.tracker_says(words);
-    }
-    said_by_program(sentence) { return sentence ? t(sentence[0], ...sentence.slice(1).map((word) => t(word))) : ''; }
-
     // Asks the user. Throws a PlainError.
     async start() {
         if (!navigator.mediaDevices?.getUserMedia)
@@ -231,36 +196,12 @@ export class CameraTracker {
         this.took_ms = 0.9 * (this.took_ms ?? took_ms) + 0.1 * took_ms;
         this.newest = {tools, fresh: true};
         this.scan.touched();
-        const kStates = {good: t('Good'), poor: t('Poor'), lost: t('Lost')};
-        tools.forEach(({status, sigma_mm}, n) => {
-            const words = status === 'lost' ? kStates.lost : `${kStates[status]} · ${sigma_mm.toFixed(1)} mm`;
-            if (this.states[n].textContent !== words) this.states[n].textContent = words;
-        });
+        this.show_states();
         this.missed = tools[0].status === 'lost' ? this.missed + 1 : 0;
         this.say_above(this.is_placed() && this.missed >= kMissed ? t('The camera does not see the probe.') : '');
         if (this.pictures % 15 === 1) this.delay.textContent = `${this.late_ms.toFixed(0)} ms`;
-        this.say([this.setup_words, this.is_placed() ? '' : t('Hold the probe where the exercise begins, then press the button below.'),
+        this.say([this.setup_words, this.place_words(),
             this.said_by_program(message)].filter((words) => words).join(' '));
     }
-
-    // A case's mannequin lies where the probe was when it was said to be at the start.
-    is_placed() { return this.placed?.case_name === this.scan.description.case_name; }
-    place() {
-        const probe = this.newest?.tools[0];
-        if (probe?.status !== 'good') {
-            this.say(t('The pose of the probe is not good: hold it still, with the board in view.'));
-            return;
-        }
-        this.placed = {case_name: this.scan.description.case_name, mannequin_from_board: pose_times(this.scan.core.probe_home(), pose_inverse(probe.rows))};
-        this.newest.fresh = true;
-        this.scan.touched();
-    }
-    // As PoseSource: the newest poses since the last call; null: none have come, or it is not known where they are.
-    take() {
-        if (!this.newest?.fresh || !this.is_placed()) return null;
-        this.newest.fresh = false;
-        const [probe, needle] = this.newest.tools;
-        const at = ({rows}) => pose_times(this.placed.mannequin_from_board, rows);
-        return {probe: at(probe), needle: at(needle), states: [probe.status, needle.status], tracker: 'camera'};
-    }
+    not_good_words() { return t('The pose of the probe is not good: hold it still, with the board in view.'); }
 }

@@ -20,7 +20,7 @@ export const kDoppler = [
 export const kDopplerModes = ['off', 'colour', 'power', 'spectral', 'm_mode'];
 
 // What put_tools() is told, in the order of exports.cpp.
-const kToolStates = ['absent', 'good', 'poor', 'lost'], kTrackers = ['', 'poses', 'camera'];
+const kToolStates = ['absent', 'good', 'poor', 'lost'], kTrackers = ['', 'poses', 'camera', 'usb'];
 
 export const kFrameStatus = ['rendered', 'held_bad_pose', 'no_contact'];
 
@@ -120,6 +120,8 @@ export class Core {
         this.check(this.calls.open_case());
         return JSON.parse(this.text());
     }
+    // A little of the check of the author's signature: null until it is done.
+    check_signature() { return this.calls.check_signature() ? JSON.parse(this.text()) : null; }
     choose_exercise(index, side_px) { this.check(this.calls.choose_exercise(index, side_px)); }
     set_image({model_paper, side, depth_mm, focus_mm}) {
         this.check(this.calls.set_image(model_paper ? 1 : 0, side, depth_mm, focus_mm));
@@ -127,6 +129,11 @@ export class Core {
     set_console({gain_db, range_db, tgc_db, flip}) {
         this.calls.set_console(gain_db, range_db, flip ? 1 : 0);
         tgc_db.forEach((db, n) => this.calls.set_tgc(n, db));
+    }
+    // From the last picture: {gain_db, tgc_db}.
+    adjusted_gain() {
+        const [gain_db, ...tgc_db] = new Float64Array(this.memory.buffer, this.calls.adjust_gain(), 9);
+        return {gain_db, tgc_db};
     }
     values() {
         const at = this.calls.values(), from = new Float64Array(this.memory.buffer, at, kValues.length);

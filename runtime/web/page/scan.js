@@ -75,8 +75,9 @@ export class ScanPage {
         click('next-hint', () => this.next_hint());
         click('skip-guide', () => this.skip_guide());
         $('mode').addEventListener('change', () => this.touched());
-        click('camera', () => this.toggle_camera());
+        for (const name of ['camera', 'usb']) click(name, () => this.toggle_tracker(name));
         click('level', () => this.level());
+        click('auto', () => this.auto_gain());
         click('flip', () => this.flip());
         click('measure', () => this.measure(!this.measuring));
         click('save-picture', () => this.save_picture());
@@ -105,8 +106,12 @@ export class ScanPage {
     // core: a case and an exercise of it are open. description: of the case
     show(core, description, exercise) {
         this.core = core;
+        if (this.description !== description) {
+            this.signature = null;
+            $('signed').textContent = '';
+        }
         this.description = description;
-        this.frozen = false;
+        this.frozen = this.replays = false;
         this.measures = [];
         this.first_point = null;
         this.measure(false);
@@ -201,14 +206,26 @@ export class ScanPage {
         if (!this.frozen && !this.held) this.take_pose(now_s);
         if (this.playing) this.play(now_s);
         if (this.held) return;
+        this.check_signature();
         const rests = this.frozen || Math.abs(now_s - this.drawn_s) < 0.98 / kIdleRate;
         if (rests && !this.moved) return;
         this.draw(now_s);
     }
     touched() { this.moved = true; }
+    // Once all of the case is here, a little with each picture.
+    check_signature() {
+        if (this.signature || this.values.segments_left) return;
+        this.signature = this.core.check_signature();
+        if (!this.signature) return;
+        const {fit, name, fingerprint} = this.signature;
+        $('signed').textContent = fit === 'fits' ? t('Signed by {} (key {}).', name, fingerprint)
+            : fit === 'differs' ? t('The signature of {} (key {}) does not fit: the case was changed since, or the signature is that of another.', name, fingerprint)
+            : fit === 'unreadable' ? t('The case has a signature that this program cannot read.') : '';
+        $('signed').classList.toggle('fail', fit === 'differs' || fit === 'unreadable');
+    }
     // A tracker's newest pose moves the tools; hands move them again from there on.
     take_pose(now_s) {
-        const poses = (this.camera ?? this.poses)?.take();
+        const poses = (this.camera ?? this.usb ?? this.poses)?.take();
         if (!poses) return;
         this.core.put_tools(now_s, poses.probe, poses.needle, poses.states, poses.tracker);
         this.moved = true;
@@ -262,7 +279,9 @@ export class ScanPage {
         if (attempt && this.frames % 10 === 0) this.say_events();
         if (attempt !== !$('procedure').hidden || this.frames % 10 === 0) this.say_procedure(attempt);
         const age = this.frozen ? this.core.calls.kept_age_s(this.back) : 0;
-        put('cine-words', this.frozen ? t('FROZEN %.1f s ago', age) : t('Live, last 20 s'));
+        if (!this.frozen) this.replays = false;
+        $('to-results').hidden = !this.replays;
+        put('cine-words', this.replays ? `${t('Replay')} ${minutes(Math.max(this.core.calls.kept_age_s(v.kept - 1) - age, 0))}` : this.frozen ? t('FROZEN %.1f s ago', age) : t('Live, last 20 s'));
         $('cine').disabled = !this.frozen;
         $('cine').max = Math.max(v.kept - 1, 0);
         $('cine').value = Math.max(v.kept - 1, 0) - (this.back ?? 0);
@@ -404,6 +423,7 @@ export class ScanPage {
         this.set_console({});
     }
     level() { this.set_console({tgc_db: new Array(kSliders).fill(0)}); }
+    auto_gain() { if (this.status === 0) this.set_console(this.core.adjusted_gain()); }
     flip() { this.set_console({flip: !this.console.flip}); }
     flip_sign() { return this.console.flip ? -1 : 1; }
     mm_per_css_px() { return this.values.mm_per_px * this.values.side / this.picture.css_side; }
@@ -415,13 +435,25 @@ export class ScanPage {
         $('freeze').textContent = this.frozen ? t('Live') : t('Freeze');
         this.touched();
     }
+    // What the program keeps are the pictures of the attempt that ended last, until it goes on live.
+    look_at_attempt(back, plays) {
+        this.values = this.core.values();
+        this.look_back(back);
+        this.playing = plays;
+        this.replays = true;
+        $('freeze').textContent = t('Live');
+        if (this.running) return;
+        this.running = true;
+        requestAnimationFrame((ms) => this.tick(ms));
+    }
     look_back(back) {
         if (!this.frozen) this.freeze(true);
         this.back = clamp(back, 0, Math.max(this.values.kept - 1, 0));
         this.touched();
     }
     play(now_s) {
-        if (now_s - this.drawn_s < 0.98 / 60) return;
+        const until_next = this.back > 0 ? this.core.calls.kept_age_s(this.back) - this.core.calls.kept_age_s(this.back - 1) : 0;
+        if (now_s - this.drawn_s < 0.98 * clamp(until_next, 1 / 60, 1)) return;
         this.look_back(this.back > 0 ? this.back - 1 : this.values.kept - 1);
     }
 
@@ -441,32 +473,36 @@ export class ScanPage {
         this.core.calls.advance_needle(mm - this.values.needle_depth_mm);
         this.touched();
     }
-    // Its part of the page, its worker and its program are fetched here, and the user is asked.
-    async toggle_camera() {
-        const show = (camera) => {
-            this.camera = camera;
-            $('camera').setAttribute('aria-pressed', String(camera !== null));
-            $('camera-room').hidden = camera === null;
+    // The tracker of a button: its part of the page and its program are fetched here, and the user is asked. `name`: camera or
+    // usb; one at a time.
+    async toggle_tracker(name) {
+        const show = (tracker) => {
+            this[name] = tracker;
+            $(name).setAttribute('aria-pressed', String(tracker !== null));
+            $(`${name}-room`).hidden = tracker === null;
         };
-        if (this.camera) {
-            this.camera.stop();
+        if (this[name]) {
+            this[name].stop();
             show(null);
             return;
         }
+        const other = name === 'camera' ? 'usb' : 'camera';
+        if (this[other]) await this.toggle_tracker(other);
         this.notice('');
         try {
-            if (!kCamera) throw new PlainError(t('This page was built without the camera.'));
-            if (inside_page('program')) throw new PlainError(t('A page in one file cannot use the camera: open the site instead.'));
-            const {CameraTracker} = await import('./camera.js').catch(() => {
-                throw new PlainError(t('The program of the camera did not load. Check the network, then press Camera again.'));
+            if (name === 'camera' && !kCamera) throw new PlainError(t('This page was built without the camera.'));
+            if (inside_page('program')) throw new PlainError(name === 'camera' ? t('A page in one file cannot use the camera: open the site instead.') : t('A page in one file cannot use a tracker on USB: open the site instead.'));
+            const {CameraTracker, UsbTracker} = await (name === 'camera' ? import('./camera.js') : import('./usb.js')).catch(() => {
+                throw new PlainError(name === 'camera' ? t('The program of the camera did not load. Check the network, then press Camera again.')
+                    : t('The program of the tracker did not load. Check the network, then press USB tracker again.'));
             });
-            if (this.camera) return;  // pressed twice
+            if (this[name]) return;  // pressed twice
             const ended = (words) => { show(null); this.notice(words); };
-            const camera = new CameraTracker(this, $('camera-room'), ended);
-            show(camera);
-            await camera.start();
+            const tracker = new (CameraTracker ?? UsbTracker)(this, $(`${name}-room`), ended);
+            show(tracker);
+            await tracker.start();
         } catch (error) {
-            this.camera?.stop();
+            this[name]?.stop();
             show(null);
             if (!(error instanceof PlainError)) throw error;
             this.notice(error.message);

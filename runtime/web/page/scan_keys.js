@@ -28,6 +28,7 @@ export function press_key(scan, code, {shift}, repeated) {
         KeyC: () => scan.clear(),
         KeyV: () => scan.view3d.show_it(!scan.view3d.on),
         KeyF: () => scan.flip(),
+        KeyG: () => scan.auto_gain(),
         KeyB: () => scan.toggle_attempt(),
         KeyH: () => scan.next_hint(),
         ...shift ? {} : {KeyJ: () => scan.perform_nth(0), KeyK: () => scan.perform_nth(1), KeyL: () => scan.perform_nth(2), KeyI: () => scan.perform_nth(3)},

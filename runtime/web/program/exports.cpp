@@ -15,6 +15,7 @@
 
 #include "formats/base/digest.h"
 #include "formats/exercise/course.h"
+#include "runtime/engine/auto_gain.h"
 #include "runtime/imaging/doppler/doppler_picture.h"
 #include "runtime/web/page_json.h"
 #include "runtime/web/page_player.h"
@@ -230,6 +231,14 @@ SONOCASE_EXPORT(runs) const SegmentRun* runs() {
 SONOCASE_EXPORT(ask_again) void ask_again(std::uint32_t first, std::uint32_t count) {
     page.player->ask_again({first, count});
 }
+// 0: the author's signature is not checked yet, call again; 1: text() says whose it is and whether
+// it fits (page_json.h).
+SONOCASE_EXPORT(check_signature) int check_signature() {
+    const CaseSignature* found = page.player->check_signature();
+    if (!found) return 0;
+    page.text = signature_json(*found);
+    return 1;
+}
 // Work that every case needs, to be done while one is on its way.
 SONOCASE_EXPORT(prepare) void prepare() {
     PagePlayer::prepare();
@@ -301,11 +310,24 @@ SONOCASE_EXPORT(set_tgc) void set_tgc(int slider, double db) {
     page.settings.tgc_db[static_cast<std::size_t>(slider) % page.settings.tgc_db.size()] = db;
 }
 
+// Gain and depth gain from the last picture (runtime/engine/auto_gain.h): gain, then the sliders.
+SONOCASE_EXPORT(adjust_gain) const double* adjust_gain() {
+    const PagePlayer& p = *page.player;
+    runtime::adjust_gain(p.pixels(), p.image().side_px, p.engine().renderer().layout(),
+                         p.image().depth_mm, page.settings);
+    page.numbers.assign(page.settings.tgc_db.begin(), page.settings.tgc_db.end());
+    page.numbers.insert(page.numbers.begin(), page.settings.gain_db);
+    return page.numbers.data();
+}
+
 SONOCASE_EXPORT(frame) int frame(double now_s) {
     return static_cast<int>(page.player->frame(now_s, page.settings));
 }
 SONOCASE_EXPORT(frame_again) int frame_again(int back) {
     return static_cast<int>(page.player->frame_again(back, page.settings));
+}
+SONOCASE_EXPORT(look_at_attempt) int look_at_attempt(double time_s) {
+    return page.player->look_at_attempt(time_s);
 }
 SONOCASE_EXPORT(kept_age_s) double kept_age_s(int back) {
     return page.player->kept_age_s(back);
@@ -376,7 +398,7 @@ SONOCASE_EXPORT(poses) double* poses() {
 // States: SensorState, in the order of kToolStates of page/core.js. tracker: of kTrackers there.
 SONOCASE_EXPORT(put_tools)
 void put_tools(double now_s, int probe_state, int needle_state, int tracker) {
-    constexpr const char* kTrackers[] = {"", "poses", "camera"};
+    constexpr const char* kTrackers[] = {"", "poses", "camera", "usb"};
     TrackerReading reading;
     reading.time_s = now_s;
     reading.in_mannequin = true;

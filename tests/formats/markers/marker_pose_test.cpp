@@ -20,11 +20,14 @@
 
 #include "formats/base/constants.h"
 #include "formats/markers/detect/camera_poses.h"
+#include "support/hard_case.h"
 #include "support/marker_jpeg.h"
 #include "support/marker_video.h"
 
 namespace sonocase {
 namespace {
+
+using testing::HardCase;
 
 using testing::MarkerVideo;
 using testing::PlacedBody;
@@ -113,7 +116,8 @@ struct Errors {
     double rms_deg() const { return std::sqrt(square_deg / good); }
 };
 
-// Bodies held still at random, found without history.
+// Bodies held still at random, found without history. defocus_px: of every picture; nothing: 0.5 to
+// 1.1, at random.
 Errors still_poses(
     const std::function<TagFindings(const std::vector<PlacedBody>&, double, VideoOptions)>& look,
     const CameraModel& camera,
@@ -123,7 +127,8 @@ Errors still_poses(
     int frames,
     double near_mm,
     double far_mm,
-    std::uint64_t seed) {
+    std::uint64_t seed,
+    std::optional<double> defocus_px = {}) {
     Errors e;
     RandomStream random(seed);
     for (int i = 0; i < frames; ++i) {
@@ -136,6 +141,7 @@ Errors still_poses(
         VideoOptions options;
         options.noise_grey = random.uniform(2, 4);
         options.defocus_px = random.uniform(0.5, 1.1);
+        if (defocus_px) options.defocus_px = *defocus_px;
         const TagFindings found = look({still_body(bodies[body], truth)}, 0.0333 * i, options);
         const auto seen = sights(found, body);
         const std::optional<BodyPose> pose = find_body_pose(camera, seen, nullptr);
@@ -164,17 +170,19 @@ Errors still_poses(
     return e;
 }
 
-#define SONOCASE_STILL(body, frames, near_mm, far_mm, seed)                                        \
+#define SONOCASE_STILL(body, frames, near_mm, far_mm, ...)                                         \
     still_poses([&](const auto& p, double t, const VideoOptions& o) { return look(p, t, o); },     \
                 camera_, bodies_, [&](const TagFindings& f, int b) { return sights(f, b); }, body, \
-                frames, near_mm, far_mm, seed)
+                frames, near_mm, far_mm, __VA_ARGS__)
 
 TEST_F(MarkerPose, AProbeThatStandsIsFoundToAMillimetre) {
     const Errors e = SONOCASE_STILL(0, 24, 400, 900, 3);
     EXPECT_GE(e.good, 0.7 * e.frames);  // of 150 of them 0.93
-    EXPECT_LE(e.rms_mm(), 0.9);
+    HardCase rms("probe, 400 to 900 mm away, rms", HardCase::at_most, 0.9, "mm");
+    rms.see(e.rms_mm());
     EXPECT_LE(e.rms_deg(), 0.3);
-    EXPECT_LE(e.worst_mm, 5);
+    HardCase worst("the worst that is called good", HardCase::at_most, 5, "mm");
+    worst.see(e.worst_mm);
     EXPECT_GE(e.within, e.good - 2);
 }
 
@@ -190,9 +198,34 @@ TEST_F(MarkerPose, ANeedlesTipIsFoundToAMillimetreAndAHalf) {
     EXPECT_LE(e.rms_mm(), 1.5);
 }
 
-TEST_F(MarkerPose, WhatIsCalledGoodIsRightWhileTheBoardIsTheWorld) {
-    // A board on the table, a probe that moves to and fro at up to 100 mm/s and turns, seen with
-    // motion blur and a rolling shutter; hidden for half a second in between.
+TEST_F(MarkerPose, WhatLiesBeyondTheFoldsDoesNotMoveABlurredTag) {
+    // A tag's white ends half a cell, here 1.5 to 2.5 pixels, beside its square.
+    constexpr double kBlurred = 1.5;
+    const Errors e = SONOCASE_STILL(1, 30, 400, 700, 6, kBlurred);
+    ASSERT_GE(e.good, 0.6 * e.frames);
+    EXPECT_LE(e.chi / e.good, 3);  // what a normal distribution in three dimensions has
+    EXPECT_EQ(e.within, e.good);
+}
+
+// A board on the table, a probe that moves to and fro at up to 100 mm/s and turns, seen with motion
+// blur and a rolling shutter, hidden from one time to another.
+struct MovingRun {
+    int good = 0, lost = 0, predicted = 0;
+    double square_mm = 0, worst_mm = 0, worst_deg = 0;
+    // Of where it is when the pose has come, without and with prediction.
+    double late_mm = 0, predicted_mm = 0, predicted_worst_deg = 0;
+    double rms_mm() const { return std::sqrt(square_mm / good); }
+    double rms_late_mm() const { return std::sqrt(late_mm / predicted); }
+    double rms_predicted_mm() const { return std::sqrt(predicted_mm / predicted); }
+};
+MovingRun moving_probe(
+    const std::function<GreyPicture(const std::vector<PlacedBody>&, double)>& picture_of,
+    const CameraModel& camera,
+    const std::vector<MarkerBody>& bodies,
+    TagDetector detector,
+    int frames,
+    double hidden_from_s,
+    double hidden_to_s) {
     const Rigid table = camera_from_table(650, 55 * kRadPerDeg);
     const Rigid board{table.rotation, table * Point3{0, 120, 0} - Point3{}};
     const auto probe = [&](double t) {
@@ -202,19 +235,16 @@ TEST_F(MarkerPose, WhatIsCalledGoodIsRightWhileTheBoardIsTheWorld) {
         p.translation = {40 * std::sin(2.5 * t), -60 + 20 * std::cos(1.7 * t), 150};
         return table * p;
     };
-    PictureFollower follower(std::move(*detector_), MarkerFollower(camera_, bodies_));
-    PosePredictor predictor(bodies_[0].body_from_tool * Point3{});
-    constexpr double kLateS = 0.045;
-    int good = 0, lost = 0, predicted = 0, since_lost = 0;
-    double square_mm = 0, worst_mm = 0, worst_deg = 0;
-    double late_mm = 0, predicted_mm = 0, predicted_worst_deg = 0;
-    constexpr double kFrameS = 1 / 30.0;
-    constexpr int kFrames = 40;
-    for (int i = 0; i < kFrames; ++i) {
+    PictureFollower follower(std::move(detector), MarkerFollower(camera, bodies));
+    PosePredictor predictor(bodies[0].body_from_tool * Point3{});
+    constexpr double kLateS = 0.045, kFrameS = 1 / 30.0;
+    MovingRun run;
+    int since_lost = 0;
+    for (int i = 0; i < frames; ++i) {
         const double t = i * kFrameS;
-        const bool hidden = t >= 0.4 && t < 0.9;
-        std::vector<PlacedBody> placed{still_body(bodies_[2], board)};
-        if (!hidden) placed.push_back({&bodies_[0], probe});
+        const bool hidden = t >= hidden_from_s && t < hidden_to_s;
+        std::vector<PlacedBody> placed{still_body(bodies[2], board)};
+        if (!hidden) placed.push_back({&bodies[0], probe});
         const FollowerPicture seen = follower.follow(picture_of(placed, t), t);
         EXPECT_TRUE(seen.board_seen) << i;
         EXPECT_TRUE(seen.problem.empty()) << seen.problem.format();
@@ -223,43 +253,50 @@ TEST_F(MarkerPose, WhatIsCalledGoodIsRightWhileTheBoardIsTheWorld) {
         if (hidden) {
             EXPECT_EQ(reading.status, MarkerStatus::lost) << i;
         }
-        if (t < 0.4 || t >= 1.0) {
+        if (t < hidden_from_s || t >= hidden_to_s + 0.1) {
             EXPECT_NE(reading.status, MarkerStatus::lost) << i;
         }
-        lost += reading.status == MarkerStatus::lost;
+        run.lost += reading.status == MarkerStatus::lost;
         EXPECT_EQ(seen.tools[1].status, MarkerStatus::lost);
         const Rigid now = predictor.follow(reading, t, t + kLateS);
         since_lost = reading.status == MarkerStatus::lost ? 0 : since_lost + 1;
         if (reading.status != MarkerStatus::good) continue;
-        ++good;
-        const Point3 tool = bodies_[0].body_from_tool * Point3{};
+        ++run.good;
+        const Point3 tool = bodies[0].body_from_tool * Point3{};
         const Rigid truth = inverse(board) * probe(t);
-        // Where it is when the pose has come.
         const Rigid then = inverse(board) * probe(t + kLateS);
         constexpr int kStarted = 5;  // pictures
         if (since_lost > kStarted) {
             const double late = distance(reading.world_from_body * tool, then * tool);
             const double left = distance(now * tool, then * tool);
-            late_mm += late * late, predicted_mm += left * left, ++predicted;
-            predicted_worst_deg =
-                std::max(predicted_worst_deg,
+            run.late_mm += late * late, run.predicted_mm += left * left, ++run.predicted;
+            run.predicted_worst_deg =
+                std::max(run.predicted_worst_deg,
                          kDegPerRad * rotation_angle(transpose(then.rotation) * now.rotation));
         }
         const double off = distance(reading.world_from_body * tool, truth * tool);
         const double deg = kDegPerRad * rotation_angle(transpose(truth.rotation) *
                                                        reading.world_from_body.rotation);
-        square_mm += off * off;
-        worst_mm = std::max(worst_mm, off), worst_deg = std::max(worst_deg, deg);
+        run.square_mm += off * off;
+        run.worst_mm = std::max(run.worst_mm, off), run.worst_deg = std::max(run.worst_deg, deg);
     }
-    EXPECT_GE(good, 0.8 * (kFrames - lost));
-    EXPECT_LE(lost, 15 + 3);
-    EXPECT_LE(std::sqrt(square_mm / good), 1.5);
-    EXPECT_LE(worst_mm, 5);
-    EXPECT_LE(worst_deg, 2);
-    ASSERT_GE(predicted, 10);
-    EXPECT_LE(std::sqrt(predicted_mm / predicted), 1.5);
-    EXPECT_LE(predicted_worst_deg, 1);
-    EXPECT_LE(predicted_mm, 0.2 * late_mm);
+    return run;
+}
+
+TEST_F(MarkerPose, WhatIsCalledGoodIsRightWhileTheBoardIsTheWorld) {
+    constexpr int kFrames = 40;
+    const MovingRun run =
+        moving_probe([&](const auto& placed, double t) { return picture_of(placed, t); }, camera_,
+                     bodies_, std::move(*detector_), kFrames, 0.4, 0.9);
+    EXPECT_GE(run.good, 0.8 * (kFrames - run.lost));
+    EXPECT_LE(run.lost, 15 + 3);
+    EXPECT_LE(run.rms_mm(), 1.5);
+    EXPECT_LE(run.worst_mm, 5);
+    EXPECT_LE(run.worst_deg, 2);
+    ASSERT_GE(run.predicted, 10);
+    EXPECT_LE(run.rms_predicted_mm(), 1.5);
+    EXPECT_LE(run.predicted_worst_deg, 1);
+    EXPECT_LE(run.predicted_mm, 0.2 * run.late_mm);
 }
 
 TEST_F(MarkerPose, OneTagAloneIsNeverCalledGood) {
@@ -292,7 +329,8 @@ TEST_F(MarkerPose, ACameraThatHangsUpsideDownSeesTheSame) {
     const MarkerReading reading = follower.follow({grey.data(), 1280, 720, 1280}, 0).tools[0];
     ASSERT_EQ(reading.status, MarkerStatus::good);
     const Point3 tool = bodies_[0].body_from_tool * Point3{};
-    EXPECT_LT(distance(reading.world_from_body * tool, inverse(board) * probe * tool), 1.5);
+    HardCase off("probe, the camera upside down, off", HardCase::at_most, 1.5, "mm");
+    off.see(distance(reading.world_from_body * tool, inverse(board) * probe * tool));
 }
 
 TEST_F(MarkerPose, TimesThatComeInClumpsDoNotThrowTheSearchOff) {
@@ -300,13 +338,16 @@ TEST_F(MarkerPose, TimesThatComeInClumpsDoNotThrowTheSearchOff) {
     const Rigid board{table.rotation, table * Point3{-110, 90, 0} - Point3{}};
     const auto probe = [&](double t) { return table * Rigid{{}, {-60 + 120 * t, -60, 150}}; };
     PictureFollower follower(std::move(*detector_), MarkerFollower(camera_, bodies_));
+    HardCase lost("of four pictures whose times come in clumps, lost", HardCase::at_most, 0, "");
+    int poor = 0;
     const double said_s[] = {0, 0.033, 0.036, 0.1};
     for (int i = 0; i < 4; ++i) {
         const double t = i / 30.0;
         const FollowerPicture seen = follower.follow(
             picture_of({still_body(bodies_[2], board), {&bodies_[0], probe}}, t), said_s[i]);
-        EXPECT_EQ(seen.tools[0].status, MarkerStatus::good) << i;
+        poor += seen.tools[0].status != MarkerStatus::good;
     }
+    lost.see(poor);
 }
 
 TEST_F(MarkerPose, AfterAPauseEverythingIsFoundInTheNextPicture) {
@@ -507,6 +548,9 @@ CornerRun run_of_corners(const CameraModel& camera,
 TEST_F(MarkerPose, NoPoseThatIsCalledGoodIsFarOff) {
     const CornerRun run = run_of_corners(camera_, bodies_, 1500, 21);
     EXPECT_EQ(run.far, 0) << run.worst_mm << " mm, " << run.worst_deg << " degrees";
+    HardCase worst("1,500 pictures with wrong corners, worst pose called good", HardCase::at_most,
+                   10, "mm");
+    worst.see(run.worst_mm);
     EXPECT_GT(run.good, run.pictures / 4);
     EXPECT_GT(run.one_tag, run.pictures / 20);
     EXPECT_GT(run.two_poses, run.pictures / 20);
@@ -538,6 +582,15 @@ TEST_F(MarkerPose, DISABLED_Figures) {
             name, e.frames, 100.0 * e.good / e.frames, e.rms_mm(), e.rms_deg(), e.worst_mm,
             e.worst_deg, 100.0 * e.within / e.good, e.chi / e.good);
     }
+    const int moving = std::max(30, frames / 4);
+    const MovingRun run =
+        moving_probe([&](const auto& placed, double t) { return picture_of(placed, t); }, camera_,
+                     bodies_, std::move(*detector_), moving, 1e9, 1e9);
+    std::printf(
+        "probe that moves: %d frames, good %.1f %%, rms %.2f mm, worst %.2f mm, %.2f deg; 45 ms "
+        "later off by %.2f mm rms, predicted %.2f mm, worst %.2f deg\n",
+        moving, 100.0 * run.good / moving, run.rms_mm(), run.worst_mm, run.worst_deg,
+        run.rms_late_mm(), run.rms_predicted_mm(), run.predicted_worst_deg);
 }
 
 }  // namespace

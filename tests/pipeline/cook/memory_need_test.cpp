@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "pipeline/base/memory_limit.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/read_recipe.h"
+#include "support/paths.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -68,6 +70,27 @@ TEST(MemoryNeed, OfPhantomNeckAndFreeFluidIsWithinFifteenPercentAsWell) {
         const MemoryNeed need = need_of(m.recipe);
         EXPECT_EQ(need.stage, m.stage) << m.recipe;
         EXPECT_NEAR(need.mb / m.peak_mb, 1, 0.15) << m.recipe;
+    }
+}
+
+// The CT, whose map is read beforehand: the field of distances plans what it will hold and measure.
+TEST(MemoryNeed, OfACtIsThatOfTheDistancesThatItsMapHas) {
+    if (!std::filesystem::exists(SONOCASE_DATA "/ct/labels.nii.gz"))
+        GTEST_SKIP() << "no " SONOCASE_DATA "/ct";
+    const struct {
+        const char *labels, *voxel;
+        double peak_mb;
+    } measured[] = {{"labels.nii.gz", "2", 372},
+                    {"labels.nii.gz", "1.8", 379},
+                    {"labels_thick6mm.nii.gz", "1.3", 406}};
+    for (const auto& m : measured) {
+        const MemoryNeed need = need_of(
+            "name = \"a\"\n[inputs]\nlabels = \"" SONOCASE_DATA "/ct/" + std::string(m.labels) +
+            "\"\nlabel_table = \"" SONOCASE_DATA "/ct/labels.csv\"\nsurface = \"" SONOCASE_DATA
+            "/mannequin/sweep.csv\"\n[resample]\nvoxel_mm = " +
+            m.voxel + "\n");
+        EXPECT_GT(need.size.held_mb, 50) << m.labels;
+        EXPECT_NEAR(need.mb / m.peak_mb, 1, 0.15) << m.labels << " " << m.voxel;
     }
 }
 

@@ -111,8 +111,11 @@ struct Outcome {
 
 class MakeCase : public ::testing::Test {
   protected:
-    Outcome make(const std::string& input, const std::string& name = "case") {
+    Outcome make(const std::string& input,
+                 const std::string& name = "case",
+                 bool accept_faults = false) {
         MakeOptions options;
+        options.accept_faults = accept_faults;
         options.inputs = {folder_ / input};
         options.out = folder_ / (name + ".sonocase");
         options.preset = "draft";
@@ -228,6 +231,29 @@ TEST_F(MakeCase, one_organ_with_its_ct_becomes_a_case_for_that_organ) {
     ASSERT_TRUE(outcome.made) << outcome.sentence;
     EXPECT_TRUE(outcome.made->faults.empty()) << outcome.made->faults.front();
     EXPECT_TRUE(outcome.decided("no exercise kidney-access: there is no 'kidney_right'"));
+}
+
+TEST_F(MakeCase, an_organ_of_the_left_has_the_exercises_of_the_right) {
+    Study{.drawn = [](const std::string& name) { return name == "kidney_left"; }}.write(folder_,
+                                                                                        "disc");
+    const Outcome outcome = make("disc", "case", true);  // the check misses the other organs
+    ASSERT_TRUE(outcome.made) << outcome.sentence;
+    EXPECT_TRUE(outcome.decided("no exercise kidney-access: there is no 'kidney_right'"));
+    EXPECT_TRUE(outcome.decided("exercise kidney-access-left: target in 'kidney_left'"));
+    const std::string toml = read_text(folder_ / "case/kidney-access-left.toml");
+    const auto bundle = load_bundle(folder_ / "case.sonocase");
+    ASSERT_TRUE(bundle);
+    const auto& all = bundle->exercises;
+    const auto embedded = std::find_if(
+        all.begin(), all.end(), [](const auto& one) { return one.name == "kidney-access-left"; });
+    ASSERT_NE(embedded, all.end());
+    const auto exercise = parse_exercise(embedded->toml, embedded->name);
+    ASSERT_TRUE(exercise) << exercise.error().message();
+    EXPECT_EQ(exercise->name, "kidney-access-left");
+    EXPECT_EQ(exercise->title, "Access to the lower calyx of the left kidney");
+    for (const char* word : {"right kidney", "_right", "rechte", "liver", "Leber"})
+        EXPECT_EQ(toml.find(word), std::string::npos) << word;
+    EXPECT_NE(toml.find("bright"), std::string::npos) << "a part of another word";
 }
 
 TEST_F(MakeCase, a_head_alone) {

@@ -9,12 +9,14 @@
 #include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/base/parallel.h"
 #include "pipeline/pathology/answer_key.h"
+#include "support/hard_case.h"
 #include "support/shapes.h"
 
 namespace sonocase::pipeline {
 namespace {
 
 using testing::count_label;
+using testing::HardCase;
 
 // A body of fat (1) with a liver (2), a vessel through it (3), a bladder of bile (4), a bone (5)
 // and a lung (6), in 2 mm.
@@ -66,11 +68,13 @@ std::string refusal(Phantom& phantom, std::vector<PathologyRequest> requests) {
 
 TEST(Pathology, VolumesAreThoseAskedForOverSeedsAndSizes) {
     Phantom phantom;
+    HardCase off("volume of a lesion, off, half a voxel being .004", HardCase::at_most, 0.0041,
+                 "ml");
     for (const double ml : {2.0, 4.0, 14.0})
         for (int seed = 1; seed <= 7; ++seed) {
             const auto placed = phantom.place({lesion("haemangioma", ml, seed)});
             ASSERT_TRUE(placed) << placed.error().message();
-            EXPECT_NEAR(placed->key[0].volume_ml, ml, 0.0041);  // half a voxel of 8 mm3
+            off.see(std::abs(placed->key[0].volume_ml - ml));
             const auto voxels = static_cast<double>(count_label(placed->volume, 7));
             EXPECT_NEAR(voxels * 0.008, ml, 0.0041);
         }

@@ -444,6 +444,42 @@ TEST(Procedures, WhatGoesWrongInTheNeckIsNamed) {
     EXPECT_EQ(pushed(v.vein, -1 * v.outwards, 0, "inject=1"), "intravascular_injection");
 }
 
+// Air spreads from where the lung was hit, at the same pace in any order of samples, and stays.
+TEST(Procedures, AirSpreadsFromALungThatWasHit) {
+    const Exercise exercise = procedure_called("central-line");
+    const testing::AnalyticAnatomy& body = body_of(exercise.name);
+    for (const double dt_s : {0.02, 0.1}) {
+        ProcedureRun machine(exercise,
+                             std::shared_ptr<const Anatomy>(std::shared_ptr<void>(), &body),
+                             body.labels());
+        SessionSample sample = play(exercise).samples.front();
+        sample.needle_ok = true;
+        const Point3 lung{38, 4, -55};
+        const Vector3 way = normalized(Vector3{0, -0.1, -1});
+        const auto at = [&](double mm) {
+            sample.mannequin_from_needle = sample.mannequin_from_drawn =
+                along(lung + mm * way, way, any_perpendicular(way));
+            sample.time_s += dt_s;
+            machine.update(sample);
+            return machine.scene().air;
+        };
+        sample.time_s = 0;
+        EXPECT_EQ(at(-60).radius_mm, 0);
+        double mm = -60;
+        SceneChange::Air first{};
+        while (first.radius_mm == 0 && mm < 5) first = at(mm += 0.5);
+        ASSERT_GT(first.radius_mm, 0);
+        EXPECT_LT(distance(first.centre, lung + mm * way), 1e-9);
+        const double since_s = sample.time_s;
+        SceneChange::Air later{};
+        while (sample.time_s < since_s + 5) later = at(-60);
+        EXPECT_EQ(later.centre.x, first.centre.x);
+        EXPECT_NEAR(later.radius_mm, 30, 6 * 2 * dt_s);  // 6 mm/s
+        while (sample.time_s < since_s + 60) later = at(-60);
+        EXPECT_EQ(later.radius_mm, 60);
+    }
+}
+
 TEST(Procedures, WhatLeavesTheCollectionIsWhatItHeld) {
     HardCase off("volume that left, off what it held", HardCase::at_most, 1e-9, "ml");
     const Exercise exercise = procedure_called("abscess-drainage");

@@ -98,12 +98,13 @@ TEST_F(Publish, a_record_store_is_allowed_by_the_policy_and_no_other_host) {
     }
 }
 
-TEST_F(Publish, a_page_that_was_built_with_its_camera_brings_it) {
-    for (const std::string name : {"camera.js", "camera_worker.js", "camera.wasm"})
+TEST_F(Publish, a_page_that_was_built_with_trackers_brings_them) {
+    const std::vector<std::string> names{"camera.js", "camera_worker.js", "camera.wasm", "usb.js",
+                                         "usb.wasm"};
+    for (const std::string& name : names)
         ASSERT_TRUE(write_file(folder_.path() + "/program/" + name, std::string_view(name)));
     ASSERT_TRUE(publish({case_path("round body")}, site(), options_));
-    for (const std::string name : {"camera.js", "camera_worker.js", "camera.wasm"})
-        EXPECT_EQ(text_of(site("/" + name)), name);
+    for (const std::string& name : names) EXPECT_EQ(text_of(site("/" + name)), name);
 }
 
 TEST_F(Publish, a_key_of_the_record_store_is_given_to_the_page) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "block_bench.h"
+#include "runtime/imaging/physical/reference/physical_reference.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -98,6 +99,127 @@ TEST(ShadowOfGas, FadesAcrossTheApertureAndHasTheGrainOfSpeckle) {
         const double own = s.correlation(120, 180, lag), other = t.correlation(20, 180, lag);
         std::printf("%d beams apart: %.2f, speckle %.2f\n", lag, own, other);
         EXPECT_NEAR(own, other, 0.15);
+    }
+}
+
+// A lung under muscle: not so deep that its surface is the diaphragm.
+CaseBundle lung_under_wall() {
+    CaseBundle b = block_of(1, [](Point3 p) {
+        return p.z < 0 ? Phantom::outside : p.z < kFaceMm ? Phantom::liver : Phantom::gas;
+    });
+    for (Tissue& t : b.tissues) {
+        if (t.kind == TissueKind::gas) t.name = "lung";
+    }
+    b.labels[Phantom::gas].tissue = b.labels[Phantom::gas].name = "lung";
+    b.labels[Phantom::liver].name = "muscle";
+    return b;
+}
+
+struct LungBench : BlockBench {
+    explicit LungBench(const CaseBundle& lung) : BlockBench(lung, block_exercise()) {
+        frame.effects.gas_ring_down = frame.effects.attenuation = frame.effects.breathing = true;
+    }
+    // The shadow's power by beam, mean over kDraws of its noise, where the lung has moved by
+    // `slid_mm` along the probe's face and `air_mm` around the middle of its surface is air.
+    std::vector<double> shadow(double slid_mm, double air_mm) {
+        frame.motion.breathing_mm = {slid_mm, 0, 0};
+        frame.air = {{0, 0, kFaceMm}, air_mm};
+        std::vector<double> sum(192, 0.0);
+        for (std::uint32_t seed = 1; seed <= kDraws; ++seed) {
+            frame.seed = seed;
+            renderer->render(frame, field, false, false, pixels);
+            for (int k = row_of(kFromMm); k < row_of(1.8 * kFaceMm); ++k) {
+                for (int l = 0; l < 192; ++l)
+                    sum[static_cast<std::size_t>(l)] += amplitude(k, l) * amplitude(k, l);
+            }
+        }
+        for (double& power : sum) power = std::log2(power);
+        return sum;
+    }
+    BreathingField field{bundle};
+};
+
+// How far the pattern of `b` lies beyond that of `a`, mm: where their correlation is highest.
+double slid_mm(const BlockBench& bench,
+               const std::vector<double>& a,
+               const std::vector<double>& b) {
+    const double pitch_mm = bench.geometry.beams[1].origin.x - bench.geometry.beams[0].origin.x;
+    int best = 0;
+    double highest = -INFINITY;
+    for (int shift = -40; shift <= 40; ++shift) {
+        double sa = 0, sb = 0, saa = 0, sbb = 0, sab = 0;
+        int n = 0;
+        for (int l = 40; l < 152; ++l, ++n) {
+            const double x = a[static_cast<std::size_t>(l)],
+                         y = b[static_cast<std::size_t>(l + shift)];
+            sa += x, sb += y, saa += x * x, sbb += y * y, sab += x * y;
+        }
+        const double correlation =
+            (sab - sa * sb / n) / std::sqrt((saa - sa * sa / n) * (sbb - sb * sb / n));
+        if (correlation > highest) highest = correlation, best = shift;
+    }
+    return best * pitch_mm;
+}
+
+// Lung sliding, and the three signs of a pneumothorax: nothing slides, no streaks, and lines at
+// multiples of the depth stand out.
+TEST(ShadowOfLung, SlidesAsItBreathesUnlessAirLiesBeforeIt) {
+    const CaseBundle lung = lung_under_wall();
+    LungBench b(lung);
+    const std::vector<double> rest = b.shadow(0, 0);
+    const double field = b.field.weight({0, 0, kFaceMm});
+    ASSERT_GT(field, 0.2);
+    for (const double mm : {4.0, -4.0}) {
+        const double slid = slid_mm(b, rest, b.shadow(mm, 0));
+        std::printf("moved by %.1f mm, slid by %.1f\n", mm * field, slid);
+        EXPECT_NEAR(slid, mm * field, 0.6);  // three beams
+    }
+    const auto spread = [](const std::vector<double>& log2_power) {
+        double sum = 0, square = 0;
+        for (int l = 24; l < 168; ++l)
+            sum += log2_power[static_cast<std::size_t>(l)],
+                square += std::pow(log2_power[static_cast<std::size_t>(l)], 2);
+        return 10 * std::log10(2) * std::sqrt(square / 144 - std::pow(sum / 144, 2));
+    };
+    const std::vector<double> air = b.shadow(0, 100), breathed = b.shadow(4, 100);
+    std::printf("streaks: %.1f dB, behind air %.1f dB\n", spread(rest), spread(air));
+    EXPECT_GT(spread(rest), 2 * spread(air));
+    for (int l = 24; l < 168; ++l)  // the same picture: only its grain, drawn by the same seeds
+        EXPECT_NEAR(air[static_cast<std::size_t>(l)], breathed[static_cast<std::size_t>(l)], 0.02);
+    // The line at three times the depth of the face, in dB over the shadow beside it.
+    const auto line_db = [&](double air_mm) {
+        (void)b.shadow(0, air_mm);
+        const double third = b.mean_envelope(b.row_of(3 * kFaceMm - 1)),
+                     beside = b.mean_envelope(b.row_of(2.5 * kFaceMm));
+        return 20 * std::log10(third / beside);
+    };
+    EXPECT_GT(line_db(100), line_db(0) + 4);
+    // In the middle alone: beyond it, behind the lung point, the lung slides on.
+    const std::vector<double> part = b.shadow(0, 12), part_breathed = b.shadow(4, 12);
+    const auto changed = [&](int first, int end) {
+        double sum = 0;
+        for (int l = first; l < end; ++l)
+            sum += std::abs(part[static_cast<std::size_t>(l)] -
+                            part_breathed[static_cast<std::size_t>(l)]);
+        return sum / (end - first);
+    };
+    EXPECT_LT(changed(84, 108), 0.02);
+    EXPECT_GT(changed(0, 30) + changed(162, 192), 0.5);
+}
+
+TEST(ShadowOfLung, IsTheReferences) {
+    const CaseBundle lung = lung_under_wall();
+    LungBench b(lung);
+    for (const double air_mm : {0.0, 8.0, 100.0}) {
+        b.frame.motion.breathing_mm = {2, 0, 0};
+        b.frame.air = {{0, 0, kFaceMm}, air_mm};
+        b.renderer->render(b.frame, b.field, false, false, b.pixels);
+        std::vector<std::uint8_t> reference(b.pixels.size());
+        render_physical_reference(b.scene, b.geometry, b.tables, b.noise, b.frame, reference);
+        double off = 0;
+        for (std::size_t i = 0; i < reference.size(); ++i)
+            off += std::abs(int{b.pixels[i]} - int{reference[i]});
+        EXPECT_LT(off / static_cast<double>(reference.size()), 0.1) << air_mm;
     }
 }
 

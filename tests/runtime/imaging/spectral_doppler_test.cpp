@@ -155,7 +155,8 @@ TEST(SpectralGate, HardPlaces) {
     FlowField field = tube_at(30, 90, 4, 3);
     Trace across(field, 60, 80);
     across.run(1);
-    EXPECT_NEAR(across.strip.gate().angle_deg, 90, 0.5);
+    HardCase angle("angle of flow across the beam, off 90", HardCase::at_most, 0.5, "degrees");
+    angle.see(std::abs(across.strip.gate().angle_deg - 90));
     EXPECT_TRUE(across.strip.gate().blood);
     across.settings.gate_depth_mm = 50;  // beside the vessel
     across.run(1);
@@ -185,9 +186,13 @@ TEST(SpectralStrip, ReplaysToTheSameLinesWhateverTheFrameRate) {
     two.strip.advance(two.settings, 0, 70, 4, two.tissue);
     for (int i = 0; i <= 26; ++i) two.strip.advance(two.settings, i / 13.0, 70, 4, two.tissue);
     ASSERT_EQ(one.strip.last(), two.strip.last());
+    HardCase lines("of 300 lines, other at 13 than at 30 frames a second", HardCase::at_most, 0,
+                   "");
+    int differ = 0;
     for (int k = 0; k < 300; ++k)
-        EXPECT_EQ(one.strip.line(one.strip.last() - k).shade,
-                  two.strip.line(two.strip.last() - k).shade);
+        differ += one.strip.line(one.strip.last() - k).shade !=
+                  two.strip.line(two.strip.last() - k).shade;
+    lines.see(differ);
 }
 
 TEST(SpectralStrip, TheSoundHasTheSpectrumThatIsShown) {

@@ -8,14 +8,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include "formats/files/atomic_file.h"
+#include "formats/scoring/anatomy.h"
 #include "formats/scoring/draw_attempt.h"
 #include "runtime/player/app/settings.h"
 #include "runtime/player/session/open_case.h"
 #include "runtime/web/page_json.h"
 #include "runtime/web/warm_up.h"
+#include "support/flowing_case.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"
 
@@ -59,6 +62,68 @@ TEST(PagePlayer, a_kept_picture_is_rendered_again_to_the_same_pixels) {
         EXPECT_EQ(copy(player->pixels()), shown[9 - back]) << back;
         EXPECT_NEAR(player->kept_age_s(back), 0.1 * back, 1e-12);
     }
+}
+
+TEST(PagePlayer, an_attempt_that_ended_is_looked_at_again_from_any_moment) {
+    const auto player = open_small();
+    EXPECT_EQ(player->look_at_attempt(0), -1) << "there was none";
+    ASSERT_TRUE(player->start_attempt("", "2026-01-31T12:00:00Z", 50));
+    EXPECT_EQ(player->look_at_attempt(0), -1) << "it runs";
+    std::vector<std::vector<std::uint8_t>> shown;
+    constexpr int kFrames = 400;
+    for (int n = 0; n < kFrames; ++n) {
+        player->hands().slide(0, n < 200 ? 0.1 : -0.1);
+        player->frame(50 + 0.1 * n, {});
+        shown.push_back(copy(player->pixels()));
+    }
+    ASSERT_TRUE(player->finish_attempt());
+    for (const int n : {0, 7, 250, kFrames - 1}) {
+        const int back = player->look_at_attempt(0.1 * n + 0.05);
+        ASSERT_EQ(back, kFrames - 1 - n);
+        ASSERT_EQ(player->kept(), kFrames);
+        player->frame_again(back, {});
+        EXPECT_EQ(copy(player->pixels()), shown[static_cast<std::size_t>(n)]) << n;
+    }
+    EXPECT_EQ(player->look_at_attempt(-5), kFrames - 1) << "before it began: its first";
+    EXPECT_EQ(player->look_at_attempt(1e9), 0);
+    player->frame(100, {});
+    EXPECT_EQ(player->kept(), kFrames + 1) << "live again: the ring goes on where it was";
+    ASSERT_TRUE(player->choose_exercise(0, 128));
+    EXPECT_EQ(player->look_at_attempt(0), -1) << "another exercise";
+}
+
+TEST(PagePlayer, a_long_attempt_keeps_fewer_pictures_a_second) {
+    const auto player = open_small();
+    ASSERT_TRUE(player->choose_exercise(0, 16));
+    ASSERT_TRUE(player->start_attempt("", "2026-01-31T12:00:00Z", 0));
+    for (int n = 0; n < 3300; ++n) player->frame(0.1 * n, {});
+    ASSERT_TRUE(player->finish_attempt());
+    const int back = player->look_at_attempt(165);
+    EXPECT_GT(player->kept(), 1500);
+    EXPECT_LT(player->kept(), 3000);
+    EXPECT_NEAR(player->kept_age_s(back), 329.9 - 165, 0.3);
+}
+
+TEST(PagePlayer, a_signature_is_checked_bit_by_bit) {
+    const std::vector<std::uint8_t> plain = write_bundle(testing::small_case());
+    const SigningKey key{{1, 2, 3}};
+    const auto made = signed_case(plain, key, "Anna", "small");
+    ASSERT_TRUE(made);
+    const auto said = [](const std::vector<std::uint8_t>& bytes) {
+        auto player = PagePlayer::open({bytes.begin(), bytes.end()}, "small");
+        EXPECT_TRUE(player);
+        const CaseSignature* found = nullptr;
+        int steps = 1;
+        while (!(found = (*player)->check_signature())) ++steps;
+        return std::pair{*found, steps};
+    };
+    EXPECT_EQ(said(plain).first.fit, SignatureFit::none);
+    EXPECT_EQ(said(plain).second, 1) << "nothing is paid without one";
+    const auto [found, steps] = said(*made);
+    EXPECT_EQ(found.fit, SignatureFit::fits);
+    EXPECT_GT(steps, 5);
+    EXPECT_EQ(signature_json(found), "{\"fit\":\"fits\",\"name\":\"Anna\",\"fingerprint\":\"" +
+                                         fingerprint_of(public_key_of(key)) + "\"}");
 }
 
 TEST(PagePlayer, an_attempt_is_scored_as_its_recording_is) {
@@ -437,6 +502,156 @@ TEST(PageStandings, are_those_of_the_windows_rule) {
     for (const char* damaged : {"", "{}", R"({"attempts":[]})", R"({"attempts":[{}],"asked":[]})",
                                 R"({"attempts":[],"asked":[{"case":"a","exercise":"b"}]})"})
         EXPECT_FALSE(standings_json(damaged)) << damaged;
+}
+
+// The Doppler modes: those of the desktop, in a recording too, and not before the flow of blood has
+// arrived.
+
+std::unique_ptr<PagePlayer> open_tube() {
+    auto player = PagePlayer::open(bytes_of(testing::flowing_case()), "tube");
+    EXPECT_TRUE(player);
+    EXPECT_TRUE((*player)->choose_exercise(0, 128));
+    return std::move(*player);
+}
+
+ImageSettings settings_of(PagePlayer& player, DopplerMode mode) {
+    ImageSettings settings;
+    settings.doppler.mode = mode;
+    EXPECT_TRUE(player.begin_doppler());
+    settings.doppler = player.doppler().aimed(player.engine(), settings.doppler);
+    return settings;
+}
+
+long coloured(const PagePlayer& player) {
+    const auto overlay = player.doppler().overlay();
+    return std::count_if(overlay.begin(), overlay.end(), [](std::uint8_t i) { return i != 0; });
+}
+
+TEST(PageDoppler, ShowsNothingUntilItIsBegunAndEachModeItsOwnPart) {
+    const auto player = open_tube();
+    player->hands().rotate(1.57);
+    player->frame(0, {});
+    ImageSettings early;
+    early.doppler.mode = DopplerMode::colour;
+    player->frame(0.1, early);
+    EXPECT_TRUE(player->doppler().overlay().empty());
+    EXPECT_FALSE(player->doppler().report().on);
+
+    player->frame(0.2, settings_of(*player, DopplerMode::colour));
+    EXPECT_TRUE(player->doppler().has_flow());
+    EXPECT_GT(coloured(*player), 50);
+    EXPECT_TRUE(player->doppler().strip(64, 16).empty());
+    EXPECT_TRUE(player->doppler().sound().empty());
+
+    const ImageSettings spectral = settings_of(*player, DopplerMode::spectral);
+    for (int n = 0; n < 30; ++n) player->frame(0.3 + 0.1 * n, spectral);
+    EXPECT_TRUE(player->doppler().overlay().empty());
+    EXPECT_EQ(player->doppler().strip(64, 16).size(), 64u * 16u);
+    EXPECT_FALSE(player->doppler().sound().empty());
+    EXPECT_GT(player->doppler().measures().psv_cm_s, 1);
+
+    player->frame(4, {});
+    EXPECT_TRUE(player->doppler().strip(64, 16).empty());
+    EXPECT_FALSE(player->doppler().report().on);
+}
+
+// A kept picture has its colours again; the strip stays as it was frozen.
+TEST(PageDoppler, AKeptPictureIsShownInItsColours) {
+    const auto player = open_tube();
+    player->hands().rotate(1.57);
+    player->frame(0, {});
+    const ImageSettings settings = settings_of(*player, DopplerMode::colour);
+    std::vector<std::vector<std::uint8_t>> shown;
+    for (int n = 0; n < 4; ++n) {
+        player->hands().slide(0, 2);
+        player->frame(1 + 0.1 * n, settings);
+        shown.emplace_back(player->doppler().overlay().begin(), player->doppler().overlay().end());
+    }
+    player->frame_again(2, settings);
+    const auto overlay = player->doppler().overlay();
+    EXPECT_TRUE(std::equal(overlay.begin(), overlay.end(), shown[1].begin(), shown[1].end()));
+}
+
+// Another depth makes another view; the mode goes on in it.
+TEST(PageDoppler, AnotherImageGoesOnInTheMode) {
+    const auto player = open_tube();
+    player->hands().rotate(1.57);
+    player->frame(0, {});
+    const ImageSettings settings = settings_of(*player, DopplerMode::power);
+    player->frame(0.1, settings);
+    EXPECT_GT(coloured(*player), 50);
+    PageImage image = player->image();
+    image.depth_mm = 80;
+    image.side_px = 192;
+    ASSERT_TRUE(player->set_image(image));
+    player->frame(0.2, settings);
+    EXPECT_EQ(player->doppler().overlay().size(), 192u * 192u);
+    EXPECT_GT(coloured(*player), 50);
+}
+
+TEST(PageDoppler, ARecordingKeepsWhatWasShownAndIsScoredAsOnTheDesktop) {
+    const auto player = open_tube();
+    player->hands().rotate(1.57);
+    player->frame(0, {});
+    const ImageSettings colour = settings_of(*player, DopplerMode::colour),
+                        spectral = settings_of(*player, DopplerMode::spectral);
+    ASSERT_TRUE(player->start_attempt("somebody", "2026-01-31T12:00:00Z", 10));
+    for (int n = 0; n < 20; ++n) player->frame(10 + 0.1 * n, colour);
+    for (int n = 0; n < 60; ++n) player->frame(12 + 0.1 * n, spectral);
+    const auto finished = player->finish_attempt();
+    ASSERT_TRUE(finished);
+    const auto sequence = read_sequence(finished->recording, "");
+    ASSERT_TRUE(sequence);
+    const auto session = session_from_sequence(*sequence, guess_names(*sequence), "");
+    ASSERT_TRUE(session);
+    const SessionSample& first = session->samples[10];
+    EXPECT_TRUE(first.has_doppler);
+    EXPECT_EQ(first.doppler.coloured, std::vector<std::string>{"vessel"});
+    const SessionSample& last = session->samples.back();
+    EXPECT_EQ(last.doppler.gate, "vessel");
+    EXPECT_GT(last.doppler.beats, 0);
+    EXPECT_GT(last.doppler.psv_cm_s, 1);
+    const auto whole = testing::flowing_case();
+    const CaseAnatomy anatomy(whole, breathing_shown(player->exercises()[0], session->header));
+    EXPECT_EQ(score_json(score_session(*session, player->exercises()[0], &anatomy, whole.labels),
+                         player->exercises()[0]),
+              finished->score_json);
+}
+
+TEST(PageDoppler, WaitsForTheFlowOfACaseThatArrives) {
+    const auto file = arranged_for_loading(write_bundle(testing::flowing_case()), true, "tube");
+    ASSERT_TRUE(file);
+    constexpr std::size_t kSegment = 256;
+    Arrivals arrivals(file->size(), kSegment);
+    const auto parts = parts_to_open(*file, "tube");
+    ASSERT_TRUE(parts);
+    for (const ByteRange& range : *parts)
+        for (std::size_t n = range.at / kSegment; n * kSegment < range.end(); ++n) arrivals.add(n);
+    auto opened =
+        PagePlayer::open_in_parts({file->begin(), file->end()}, std::move(arrivals), "tube");
+    ASSERT_TRUE(opened) << opened.error().message();
+    PagePlayer& player = **opened;
+    ASSERT_TRUE(player.choose_exercise(0, 128));
+    player.frame(0, {});
+    const Status early = player.begin_doppler();
+    ASSERT_FALSE(early);
+    EXPECT_NE(early.error().message().find("loading"), std::string::npos);
+    for (std::size_t n = 0; n < player.bundle().arrivals()->segments(); ++n) player.arrived(n);
+    ASSERT_TRUE(player.look_again());
+    EXPECT_TRUE(player.begin_doppler());
+    EXPECT_TRUE(player.doppler().has_flow());
+}
+
+TEST(PageDoppler, ACaseWithoutFlowSaysSo) {
+    auto opened = PagePlayer::open(bytes_of(testing::small_case()), "still");
+    ASSERT_TRUE(opened);
+    ASSERT_TRUE((*opened)->choose_exercise(0, 128));
+    ASSERT_TRUE((*opened)->begin_doppler());
+    EXPECT_FALSE((*opened)->doppler().has_flow());
+    ImageSettings settings;
+    settings.doppler.mode = DopplerMode::colour;
+    (*opened)->frame(0, settings);
+    EXPECT_EQ(coloured(**opened), 0);
 }
 
 }  // namespace

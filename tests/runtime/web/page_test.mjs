@@ -91,6 +91,12 @@ await run_tests({
         writeFileSync(file, Buffer.from(recording));
         expect_equal(text, run(join(bin, 'web_oracle'), 'score', case_file, file), 'scores');
         expect(JSON.parse(text).insertions.length === 1, 'one insertion');
+        // The attempt's pictures again, from its beginning on, and back to its page.
+        await page.click('replay');
+        await page.until('sonoplay.app.scan.replays && document.getElementById("cine-words").textContent === "Replay 0:00"');
+        await page.until('document.getElementById("cine-words").textContent === "Replay 0:01"');
+        await page.click('to-results');
+        expect(await page.value('document.getElementById("scan").hidden && !document.getElementById("after").hidden'), 'back at the results');
         // Kept for the next visit.
         await page.until('sonoplay.app.settled === sonoplay.app.started');
         await page.click('after-cases');
@@ -124,6 +130,55 @@ await run_tests({
         expect_equal(await page.value(hint), '', 'no hint in an exam');
         expect_equal(await page.value(tip), '–', 'no distance in an exam');
         await page.close();
+    },
+    async a_second_attempt_shows_the_trend_and_a_button_sets_the_gain() {
+        const page = await browser.page();
+        await scanning(page);
+        await page.value('sonoplay.app.scan.set_console({gain_db: 28})');
+        await page.until(`${kFrames} > ${await page.value(kFrames)} + 2`);
+        await page.click('auto');
+        expect(await page.value('sonoplay.app.scan.console.gain_db < 28 && Number(document.getElementById("gain").value) < 28'), 'darker');
+        for (const attempts of [1, 2]) {
+            await page.key('KeyB');
+            await page.until(`sonoplay.app.scan.values.attempt && ${seconds_attempt} > 5.2`);
+            await page.key('KeyB');
+            await page.until('!document.getElementById("after").hidden && sonoplay.app.settled === sonoplay.app.started');
+            // Of what was measured in both.
+            await page.value('sonoplay.app.show_trend({metric: "elapsed_time_s", title: "Total time", limit: 4})');
+            expect_equal(await page.value('document.getElementById("trend-box").hidden'), attempts === 1, 'a trend has two');
+            if (attempts === 1) await page.click('again');
+            await page.until(`document.getElementById("scan").hidden === ${attempts === 2}`);
+        }
+        expect_equal(await page.value('document.querySelectorAll("#trend circle").length'), 2, 'attempts');
+        expect(await page.value('document.querySelector("#trend .limit") !== null'), 'the mark');
+        await page.close();
+    },
+    async a_signed_case_says_by_whom_and_a_changed_one_that_it_was_changed() {
+        const key = join(work, 'anna.pem'), signed = join(work, 'signed.sonocase'), its_site = join(work, 'signed');
+        run(join(bin, 'sonocase'), 'key', 'Anna <Weber>', '-o', key);
+        run(join(bin, 'sonocase'), 'sign', case_file, '--key', key, '-o', signed);
+        const fingerprint = /fingerprint ([0-9a-f ]{39})/.exec(run(join(bin, 'sonocase'), 'inspect', signed))[1];
+        run(join(bin, 'sonocase'), 'publish', signed, '-o', its_site, '--program', program);
+        const [its_server, its_url] = await serve(its_site);
+        const page = await browser.page(), said = 'document.getElementById("signed").textContent';
+        await page.open(`${its_url}?case=signed&exercise=scan`);
+        await page.until(`${said} !== ""`);
+        expect_equal(await page.value(said), `Signed by Anna <Weber> (key ${fingerprint}).`, 'signed');
+        // The same signature on a case of which a byte is another one, its checksums mended by packing it again.
+        const changed = join(work, 'changed.sonocase');
+        run(join(bin, 'web_oracle'), 'change', signed, changed);
+        const bytes = readFileSync(changed).toString('base64');
+        await page.value(`sonoplay.app.open_file(new File([Uint8Array.from(atob("${bytes}"), (one) => one.charCodeAt(0))], 'changed.sonocase'))`);
+        await page.until(`${said}.startsWith("The signature of Anna <Weber> (key ${fingerprint}) does not fit")`);
+        // A case without one says nothing, also after one that has.
+        const plain = readFileSync(case_file).toString('base64');
+        await page.value(`sonoplay.app.open_file(new File([Uint8Array.from(atob("${plain}"), (one) => one.charCodeAt(0))], 'plain.sonocase'))`);
+        await page.until('sonoplay.app.scan.signature?.fit === "none"');
+        expect_equal(await page.value(said), '', 'unsigned');
+        expect_equal(page.errors.join(), '', 'errors on the console');
+        await page.close();
+        its_server.closeAllConnections?.();
+        its_server.close();
     },
     async mouse_and_fingers_move_the_probe() {
         const page = await browser.page();
@@ -376,6 +431,10 @@ await run_tests({
         expect(lines.some((line) => line.startsWith('Core') && line.includes('Not done')), 'what was left out is named');
         expect_equal(await text('verdict'), '✗ Not passed yet', 'verdict');
         expect((await text('advice')).startsWith('Missing: '), 'the first critical item that is missing is named');
+        // A moment of the list is shown again.
+        await page.value('document.querySelector("#checklist button").click()');
+        await page.until('sonoplay.app.scan.replays && document.getElementById("after").hidden');
+        await page.click('to-results');
         // The list, its moments and its points are those of the score, which the desktop gives too.
         const {items, points, max_points, cut} = JSON.parse(await page.value('sonoplay.app.attempt.score_text')).procedure;
         expect_equal(await text('checklist-words'), `Checklist: ${items.filter((one) => one.ticked).length} of ${items.length}, ${points} points of ${max_points}, ${cut} needed`, 'points');

@@ -10,6 +10,9 @@
 //                                                        aimed at the first pose, and with
 //                                                        XXH3-128 of overlay and strip
 //   web_oracle score CASE RECORDING                      the scores of a recording, as JSON
+//   web_oracle change CASE CHANGED                       the case with a blank more in its
+//                                                        manifest, and everything else, its
+//                                                        signature too, as it was
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -17,7 +20,9 @@
 #include <vector>
 
 #include "formats/base/digest.h"
+#include "formats/bundle/codec/chunk_file.h"
 #include "formats/exercise/case_exercises.h"
+#include "formats/files/atomic_file.h"
 #include "formats/files/load_save.h"
 #include "formats/recording/session.h"
 #include "formats/scoring/session_score.h"
@@ -149,6 +154,27 @@ int doppler_frames(const CaseBundle& bundle,
     return 0;
 }
 
+int change(const std::string& from, const std::string& to) {
+    const auto bytes = read_file(from);
+    if (!bytes) return fail(bytes.error());
+    const std::vector<std::string> types = chunk_types(*bytes);
+    const std::vector<std::string_view> known(types.begin(), types.end());
+    const auto reader = ChunkReader::open(*bytes, "CASE", known, from);
+    if (!reader) return fail(reader.error());
+    ChunkWriter writer("CASE");
+    for (const std::string& type : types) {
+        auto raw = reader->read(type, reader->raw_bytes(type));
+        if (!raw) return fail(raw.error());
+        if (type == "manifest") raw->push_back(' ');
+        if (reader->is_compressed(type))
+            writer.add(type, reader->is_required(type), std::move(*raw));
+        else
+            writer.add_packed(type, reader->is_required(type), std::move(*raw));
+    }
+    const Status written = write_file(to, std::span<const std::uint8_t>(writer.write()));
+    return written ? 0 : fail(written.error());
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -156,6 +182,7 @@ int main(int argc, char** argv) {
     const bool timed = verb == "times";
     const bool frames_asked = verb == "frames" || verb == "doppler";
     if (argc < 4 || (frames_asked && argc != 6) || (timed && argc != 6 && argc != 7)) return 2;
+    if (verb == "change") return change(argv[2], argv[3]);
     const auto bundle = load_bundle(argv[2]);
     if (!bundle) return fail(bundle.error());
     const auto sequence = load_sequence(argv[3]);

@@ -26,6 +26,7 @@ struct BeamLight {
     V bone, bone_slow, bone_floor, gas;
     V lit;                   // the last light well before a face of gas
     V reverb, period, next;  // next line: its amplitude, mm to the line after it, its depth
+    V loss;                  // of each line over the one before
     I before, before_that;   // kinds of the two samples above
     V clutter;               // power
     int tail_from = 0;
@@ -54,8 +55,7 @@ HWY_INLINE hn::Vec<D> reverb_power(D d, const PhysicalBlock& b, float r, BeamLig
     const auto pulse = hn::Mul(t.reverb, hn::Max(hn::Sub(one, hn::Mul(off, off)), hn::Zero(d)));
     const auto past = hn::Gt(off, one);
     t.next = hn::Add(t.next, hn::IfThenElseZero(past, t.period));
-    t.reverb = hn::IfThenElse(
-        past, hn::Mul(t.reverb, hn::Set(d, static_cast<float>(physical::kReverbLoss))), t.reverb);
+    t.reverb = hn::IfThenElse(past, hn::Mul(t.reverb, t.loss), t.reverb);
     return hn::Mul(pulse, pulse);
 }
 
@@ -73,18 +73,21 @@ HWY_INLINE hn::Vec<D> tail_power(D d, const PhysicalBlock& b, int k, BeamLight<D
     return power;
 }
 
-// Starts the tail and the lines of gas where `lit`.
+// Starts the tail and the lines of gas where `lit`. tail, loss: GasFaces.
 template <class D, class V, class M>
-HWY_INLINE void light_gas(D d, M lit, V light_and_gain, V facing, V depth, BeamLight<D>& t) {
+HWY_INLINE void light_gas(
+    D d, M lit, V light_and_gain, V facing, V depth, V tail, V loss, BeamLight<D>& t) {
     using namespace physical;
-    const auto ring = hn::Mul(light_and_gain, hn::Set(d, static_cast<float>(kGasTail)));
+    const auto ring =
+        hn::Mul(hn::Mul(light_and_gain, tail), hn::Set(d, static_cast<float>(kGasTail)));
     t.gas = hn::IfThenElse(lit, hn::Max(t.gas, ring), t.gas);
     const auto mirror = hn::Mul(hn::Mul(light_and_gain, facing),
-                                hn::Set(d, static_cast<float>(kReverb * kReverbLoss)));
+                                hn::Mul(loss, hn::Set(d, static_cast<float>(kReverb))));
     const auto brighter = hn::And(lit, hn::Gt(mirror, t.reverb));
     t.reverb = hn::IfThenElse(brighter, mirror, t.reverb);
     t.period = hn::IfThenElse(brighter, depth, t.period);
     t.next = hn::IfThenElse(brighter, hn::Add(depth, depth), t.next);
+    t.loss = hn::IfThenElse(brighter, loss, t.loss);
 }
 
 // Starts them at the frame's faces of gas (model/gas_faces.h), with the light shortly before the
@@ -103,7 +106,8 @@ HWY_INLINE void light_face(D d, const PhysicalBlock& b, int beam, int k, BeamLig
     const auto c = hn::LoadU(d, b.cosine + beam), c2 = hn::Mul(c, c);
     const auto facing = hn::Add(hn::Mul(hn::Set(d, 0.25f), c),
                                 hn::Mul(hn::Set(d, 0.75f), hn::Mul(c2, hn::Mul(c2, c2))));
-    light_gas(d, hn::AndNot(dome, meets), t.lit, facing, face, t);
+    light_gas(d, hn::AndNot(dome, meets), t.lit, facing, face, hn::LoadU(d, b.face_tail + beam),
+              hn::LoadU(d, b.reverb_loss + beam), t);
 }
 
 // Starts the tails of a face of bone or gas; gas counts from its second sample on, since a single
@@ -137,9 +141,9 @@ HWY_INLINE void light_tails(D d,
     t.bone_floor = hn::IfThenElse(to_bone, raise(t.bone_floor, floor), t.bone_floor);
     if (b.face_mm == nullptr) {
         // Only a surface whose direction is known is a mirror.
-        light_gas(d, to_gas, light_and_gain,
-                  hn::IfThenElseZero(hn::Lt(facing, hn::Set(d, 1.0f)), facing),
-                  hn::Set(d, above_mm), t);
+        light_gas(
+            d, to_gas, light_and_gain, hn::IfThenElseZero(hn::Lt(facing, hn::Set(d, 1.0f)), facing),
+            hn::Set(d, above_mm), hn::Set(d, 1.0f), hn::Set(d, static_cast<float>(kReverbLoss)), t);
     }
 }
 

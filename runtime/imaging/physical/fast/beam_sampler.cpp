@@ -47,6 +47,7 @@ void sample_beams_as(PhysicalBlock& b) {
                            .reverb = zero,
                            .period = zero,
                            .next = zero,
+                           .loss = zero,
                            .before = hn::Zero(di),
                            .before_that = hn::Zero(di),
                            .clutter = zero,

@@ -358,7 +358,9 @@ template <class D>
 HWY_NOINLINE bool target_chunk(D d, const PhysicalBlock& b, BeamChunk& c) {
     bool met = false;
     for (int t = 0; t < b.target_count; ++t) {
-        for (int row = 0; row < c.rows; ++row) target_row(d, b, b.targets[t], c, row, met);
+        const int begin = std::max(b.target_rows[t].begin - c.first, 0),
+                  end = std::min(b.target_rows[t].end - c.first, c.rows);
+        for (int row = begin; row < end; ++row) target_row(d, b, b.targets[t], c, row, met);
     }
     return met;
 }

@@ -201,8 +201,7 @@ PhysicalFast::PhysicalFast(const PhysicalScene& scene,
     breathing_.assign((samples / kBreathingNode + 2) * lines + kRowSlack, 0.0f);
     prepare_nodes(tables);
     streaks_.resize(kMaxStreaks);
-    for (auto* per_beam : {&faces_.depth_mm, &faces_.dome_mm, &faces_.peak, &faces_.cosine})
-        per_beam->assign(lines + kRowSlack, 0.0f);
+    faces_.resize(lines + kRowSlack);
     plane_beams_.assign(4 * lines + kRowSlack, 0.0f);
     for (std::size_t l = 0; l < lines; ++l) {
         const auto& [o, d] =
@@ -372,6 +371,39 @@ void PhysicalFast::choose_targets(const PhysicalFrame& f, bool keep_all) {
         const Point3 centre = scene_.grid.point_from_voxel(balls[t].centre_vx);
         if (keep_all || std::abs(dot(normal, centre - origin)) < thick + balls[t].reach_mm)
             near_targets_.push_back(f.balls != nullptr ? packed(balls[t]) : targets_[t]);
+    }
+}
+
+// Finds the samples of a block of beams in which each of its targets can show: all but those whose
+// tissue lies, in the plane, further off than ball, press, breath and gap together reach.
+void PhysicalFast::place_targets(const PhysicalFrame& f,
+                                 const PhysicalBlock& b,
+                                 std::span<SampleRange> out) const {
+    const ScanGeometry& g = geometry_;
+    const int last = g.scanlines - 1, first = std::min(b.first_beam, last),
+              end = std::min(b.first_beam + kBeamBlock - 1, last), middle = (first + end) / 2;
+    if (b.keep_all || b.dome_mm != nullptr) {  // behind a mirror tissue shows elsewhere
+        std::fill_n(out.begin(), b.target_count, SampleRange{0, g.samples});
+        return;
+    }
+    double moved = norm(f.motion.breathing_mm) + kTargetReachMm + 0.5;
+    if (f.press != nullptr) moved += f.press->farthest_mm();
+    double gap = 0, aside = 0;
+    for (int l = first; l <= end; ++l) gap = std::max(gap, double{gaps_[l]});
+    for (const int l : {first, end}) {
+        for (const double r : {0.0, g.depth_mm}) {
+            const ScanGeometry::Beam &a = g.beams[l], &m = g.beams[middle];
+            const double x = a.origin.x - m.origin.x + r * (a.direction.x - m.direction.x),
+                         z = a.origin.z - m.origin.z + r * (a.direction.z - m.direction.z);
+            aside = std::max(aside, std::sqrt(x * x + z * z));
+        }
+    }
+    const Rigid probe_from_volume = inverse(f.volume_from_probe);
+    for (int t = 0; t < b.target_count; ++t) {
+        const PhysicalTarget& ball = b.targets[t];
+        const Point3 p = probe_from_volume * scene_.grid.point_from_voxel(
+                                                 {double{ball.x}, double{ball.y}, double{ball.z}});
+        out[t] = samples_near(g, middle, {p.x, p.z}, double{ball.reach_mm} + moved + gap + aside);
     }
 }
 
@@ -580,6 +612,9 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
         b.streaks = streaks.data();
         b.streak_count = choose_streaks(line, streaks);
         show_faces(line, b);
+        std::array<SampleRange, kMaxFrameBalls> target_rows;
+        if (b.target_count > 0) place_targets(f, b, target_rows);
+        b.target_rows = target_rows.data();
         PhysicalWall wall;
         if (wall_shows_) {
             place_wall(keep_all, line, wall);
@@ -669,9 +704,20 @@ void PhysicalFast::prepare_nodes(const Tables& tables) {
 // Moves nodes from where the beams run to where their tissue lies at rest.
 void PhysicalFast::press_nodes(int first, int end) {
     NodeLattice& n = nodes_;
-    const bool local = press_.field->needle().moves() || !press_.field->pools().empty();
+    const bool dents = press_.field->needle().moves();
+    const std::span<const SceneChange::Pool> pools = press_.field->pools();
     for (int node = first; node < end; ++node) {
         const int line = n.spacing.line(node);
+        // The samples that pools can move; where nothing else moves, the others stay.
+        SampleRange pushed{geometry_.samples, 0};
+        for (const SceneChange::Pool& pool : pools) {
+            const SampleRange near =
+                samples_near(geometry_, line, {pool.centre.x, pool.centre.z},
+                             kPoolReaches * pool.radius_mm + press_.field->farthest_mm());
+            if (near.begin >= near.end) continue;
+            pushed = {std::min(pushed.begin, near.begin), std::max(pushed.end, near.end)};
+        }
+        const bool still = !press_.pressed && !dents;
         float along[3], side[3];
         for (int axis = 0; axis < 3; ++axis) {
             along[axis] = n.per_mm[axis][node];
@@ -680,8 +726,10 @@ void PhysicalFast::press_nodes(int first, int end) {
         for (int row = 0; row < n.rows; ++row) {
             const int k = row * n.spacing.samples;
             if (k >= press_.active) break;
+            const bool pushes = k >= pushed.begin && k < pushed.end;
+            if (still && !pushes) continue;
             const press::PressView::Shift shift =
-                local ? press_.at(line, k) : press_.by_probe(line, k);
+                dents || pushes ? press_.at(line, k) : press_.by_probe(line, k);
             const std::size_t at = n.at(row, node);
             n.x[at] += along[0] * shift.along_mm + side[0] * shift.side_mm;
             n.y[at] += along[1] * shift.along_mm + side[1] * shift.side_mm;
@@ -776,11 +824,24 @@ void PhysicalFast::find_faces(const PhysicalFrame& f, const PhysicalBlock& base,
     for (int i = 0; i < std::min(kBeamBlock, nodes_.nodes - first); ++i) {
         FaceNode& face = faces_of_nodes_[first + i];
         face = {search.depth[i], 0};
-        if (search.dome[i] == 0 || !f.effects.diaphragm) continue;
-        const std::size_t at = nodes_.at(search.row[i], first + i);
-        face.peak =
-            dome_peak(scene_, {static_cast<double>(nodes_.x[at]), static_cast<double>(nodes_.y[at]),
-                               static_cast<double>(nodes_.z[at])});
+        if (face.depth_mm >= kNoFace) continue;
+        const auto node = [&](int row) {
+            const std::size_t at = nodes_.at(row, first + i);
+            return Point3{static_cast<double>(nodes_.x[at]), static_cast<double>(nodes_.y[at]),
+                          static_cast<double>(nodes_.z[at])};
+        };
+        const int row = search.row[i];
+        const Point3 behind = node(row), before = node(row - 1);
+        const int label = label_at(scene_, static_cast<int>(std::nearbyint(behind.x)),
+                                   static_cast<int>(std::nearbyint(behind.y)),
+                                   static_cast<int>(std::nearbyint(behind.z)));
+        if (scene_.is_lung[label]) {
+            const double part =
+                (static_cast<double>(face.depth_mm) - nodes_.spacing.r_mm(row - 1)) /
+                (nodes_.spacing.r_mm(row) - nodes_.spacing.r_mm(row - 1));
+            show_lung(scene_, f, before + part * (behind - before), face);
+        }
+        if (search.dome[i] != 0 && f.effects.diaphragm) face.peak = dome_peak(scene_, behind);
     }
 }
 
@@ -790,6 +851,8 @@ void PhysicalFast::show_faces(int line, PhysicalBlock& b) const {
     b.face_mm = faces_.depth_mm.data() + line;
     b.face_peak = faces_.peak.data() + line;
     b.cosine = faces_.cosine.data() + line;
+    b.face_tail = faces_.tail.data() + line;
+    b.reverb_loss = faces_.reverb_loss.data() + line;
     if (!faces_.any_dome) return;
     const float* dome = faces_.dome_mm.data() + line;
     if (std::all_of(dome, dome + kBeamBlock, [](float mm) { return mm >= kNoFace; })) return;

@@ -63,6 +63,9 @@ class PhysicalFast {
     void set_poses(const PhysicalFrame& frame, PhysicalBlock& block) const;
     void set_tables(const PhysicalFrame& frame, PhysicalBlock& block) const;
     PhysicalBlock block_of_frame(const PhysicalFrame& frame, bool keep_all) const;
+    void place_targets(const PhysicalFrame& frame,
+                       const PhysicalBlock& block,
+                       std::span<SampleRange> out) const;
     int choose_streaks(int first, std::span<PhysicalStreak> out) const;
     void prepare_nodes(const physical::Tables& tables);
     void place_nodes(const PhysicalFrame& frame, bool breathes, int first);

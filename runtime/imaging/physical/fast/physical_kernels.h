@@ -146,13 +146,15 @@ struct PhysicalBlock {
     const PhysicalRegion* region = nullptr;  // null: the case has none
     const PhysicalWall* wall = nullptr;      // null: off
     const float* face_mm = nullptr;          // per beam: face of gas; null: not known
-    const float *face_peak = nullptr, *cosine = nullptr;
-    const float* dome_mm = nullptr;  // null: none
+    const float *face_peak = nullptr, *cosine = nullptr, *face_tail = nullptr,
+                *reverb_loss = nullptr;  // GasFaces
+    const float* dome_mm = nullptr;      // null: none
     float dome_scale = 1, mirror_light = 0;
     const PhysicalStreak* streaks = nullptr;
     int streak_count = 0;
     const float* plane = nullptr;  // beams in the plane, `lines` apart: origin x, z, direction x, z
     const PhysicalTarget* targets = nullptr;
+    const SampleRange* target_rows = nullptr;  // samples of the block that each can show in
     int target_count = 0;
     Int3 size;
     int blocks_x = 0, blocks_xy = 0, block_log2 = 3;  // of the table: BrickTable

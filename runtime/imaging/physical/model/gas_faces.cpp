@@ -24,7 +24,42 @@ void smooth(std::span<FaceNode> nodes) {
     }
 }
 
+// Smooth noise in [-1, 1]: random numbers at the corners of cubes of edge 1, smooth in between.
+double smooth_noise(Point3 p) {
+    const double cell[3] = {std::floor(p.x), std::floor(p.y), std::floor(p.z)};
+    double part[3];
+    for (int axis = 0; axis < 3; ++axis) {
+        const double u = p[axis] - cell[axis];
+        part[axis] = u * u * (3 - 2 * u);
+    }
+    double sum = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+        double weight = 1;
+        std::uint32_t bits = 0;
+        for (int axis = 0; axis < 3; ++axis) {
+            const int step = corner >> axis & 1;
+            weight *= step != 0 ? part[axis] : 1 - part[axis];
+            bits = hash32(bits + static_cast<std::uint32_t>(static_cast<int>(cell[axis]) + step));
+        }
+        sum += weight * (bits * 0x1p-31 - 1);
+    }
+    return sum;
+}
+
 }  // namespace
+
+void show_lung(const PhysicalScene& s, const PhysicalFrame& f, Point3 voxel, FaceNode& face) {
+    const double radius_mm = f.air.radius_mm;
+    if (radius_mm > 0) {
+        const double mm = s.voxel_mm * norm(voxel - s.grid.voxel_from_point(f.air.centre));
+        face.air = static_cast<float>(std::clamp((radius_mm - mm) / kAirEdgeMm, 0.0, 1.0));
+    }
+    const double streak =
+        smooth_noise(Point3{} + (s.voxel_mm / kLungStreakMm) * (voxel - Point3{}));
+    const auto air = static_cast<double>(face.air);
+    face.tail = static_cast<float>(
+        std::exp2((kLungStreakDb * (1 - air) * streak + kAirTailDb * air) / kDbPerLog2));
+}
 
 float dome_peak(const PhysicalScene& s, Point3 voxel) {
     const double strength =
@@ -66,6 +101,7 @@ FaceNode find_face(const PhysicalScene& s,
         FaceNode face{static_cast<float>(0.5 * (before + behind)), 0};
         if (s.is_lung[label] && organ && nodes.r_mm(row) > kDomeFromMm)
             face.peak = dome_peak(s, voxel_at(nodes.r_mm(row)));
+        if (s.is_lung[label]) show_lung(s, f, voxel_at(0.5 * (before + behind)), face);
         return face;
     }
     return {};
@@ -86,7 +122,11 @@ void join_faces(const ScanGeometry& g,
         const FaceNode& nearest = part < 0.5f ? a : b;
         const float depth =
                         between ? a.depth_mm + (b.depth_mm - a.depth_mm) * part : nearest.depth_mm,
-                    peak = between ? a.peak + (b.peak - a.peak) * part : nearest.peak;
+                    peak = between ? a.peak + (b.peak - a.peak) * part : nearest.peak,
+                    air = between ? a.air + (b.air - a.air) * part : nearest.air;
+        faces.tail[l] = between ? a.tail + (b.tail - a.tail) * part : nearest.tail;
+        faces.reverb_loss[l] = static_cast<float>(kReverbLoss) +
+                               air * static_cast<float>(kAirReverbLoss - kReverbLoss);
         faces.depth_mm[l] = depth;
         faces.peak[l] = depth < kNoFace ? peak : 0;
         faces.dome_mm[l] = faces.peak[l] > 0 ? depth : kNoFace;

@@ -71,6 +71,12 @@ inline constexpr double kDomeGasDb = 8;      // scatterers of the lung count as 
 inline constexpr double kDomeClearMm = 2.5;  // labels waver: gas before it takes no light there
 inline constexpr double kMirrorMm = 3, kMirrorDb = -14;
 
+// A lung's dirty shadow comes in streaks, at most kLungStreakDb to both sides, that are noise of
+// its tissue: they slide along the chest wall when it breathes. Where air of a pneumothorax lies
+// before it nothing slides, the shadow is fainter, and lines of reverberation fade more slowly (a).
+inline constexpr double kLungStreakMm = 4, kLungStreakDb = 12;
+inline constexpr double kAirTailDb = -7, kAirReverbLoss = 0.62, kAirEdgeMm = 5;
+
 // What is added to a depth to find where its tissue lies: 0 before the diaphragm.
 inline double mirrored_mm(double dome_mm, double r_mm) {
     return 2 * std::min(dome_mm - r_mm, 0.0);
@@ -80,6 +86,8 @@ inline double mirrored_mm(double dome_mm, double r_mm) {
 struct FaceNode {
     float depth_mm = kNoFace;
     float peak = 0;  // peak of the diaphragm, before the cosine; 0: another face of gas
+    float tail = 1;  // amplitude of the dirty shadow
+    float air = 0;   // 1: a pneumothorax before the lung
 };
 
 // Per beam, # lines.
@@ -87,7 +95,14 @@ struct GasFaces {
     std::vector<float> depth_mm;       // kNoFace: none
     std::vector<float> dome_mm, peak;  // depth and peak of the diaphragm; kNoFace, 0: none
     std::vector<float> cosine;         // of the angle between beam and face, in the plane
+    std::vector<float> tail;           // amplitude of the dirty shadow
+    std::vector<float> reverb_loss;    // amplitude of a line of reverberation over the one before
     bool any_dome = false;
+
+    void resize(std::size_t lines) {
+        for (auto* per_beam : {&depth_mm, &dome_mm, &peak, &cosine, &tail, &reverb_loss})
+            per_beam->assign(lines, 0.0f);
+    }
 };
 
 // Finds the face of beam nodes.line(node). Two neighbouring nodes of gas along the beam make a
@@ -101,6 +116,11 @@ FaceNode find_face(const PhysicalScene& scene,
                    const BreathingField* breathing,
                    double gap_mm,
                    int node);
+// What a lung whose surface lies at `voxel` shows behind it: FaceNode::tail and air.
+void show_lung(const PhysicalScene& scene,
+               const PhysicalFrame& frame,
+               Point3 voxel,
+               FaceNode& face);
 // Peak of the diaphragm at one of its places, before the cosine.
 float dome_peak(const PhysicalScene& scene, Point3 voxel);
 

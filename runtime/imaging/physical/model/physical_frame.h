@@ -60,6 +60,7 @@ struct PhysicalFrame {
     std::uint32_t seed = 1, frame = 0;
     std::span<const float> row_gain_db;  // # samples: console gain and TGC sliders
     double dynamic_range_db = 60;
+    SceneChange::Air air;  // at rest; radius 0: none
     MotionState motion;
     PhysicalEffects effects;
     const press::PressField* press = nullptr;  // null: nothing is pressed

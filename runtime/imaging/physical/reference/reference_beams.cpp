@@ -25,6 +25,7 @@ struct BeamLight {
     std::array<double, kMaxNeedles> needle_lines{};  // since the needle, diameters
     double lit = 0;                                  // the last light well before a face of gas
     double reverb = 0, period = 0, next = 0;  // next line: amplitude, mm between lines, its depth
+    double loss = kReverbLoss;                // of a line after the one before
     double clutter = 0;                       // power
     TissueKind before = TissueKind::soft, before_that = TissueKind::soft;  // two samples above
 
@@ -40,6 +41,7 @@ struct BeamLight {
 // A beam's face of gas, and the diaphragm on it; kNoFace: none.
 struct Face {
     double depth_mm = static_cast<double>(kNoFace), dome_mm = depth_mm, peak = 0, cosine = 1;
+    double tail = 1, reverb_loss = kReverbLoss;
 };
 
 // Starts the tails of a face of bone or gas. Gas counts from its second sample on, since a single
@@ -66,12 +68,13 @@ void light_tails(
         const double facing = known          ? 0.25 * face.cosine + 0.75 * std::pow(face.cosine, 6)
                               : p.facing < 1 ? p.facing
                                              : 0;
-        t.gas = std::max(t.gas, kGasTail * light);
-        const double mirror = kReverb * kReverbLoss * facing * light;
+        t.gas = std::max(t.gas, kGasTail * light * face.tail);
+        const double mirror = kReverb * face.reverb_loss * facing * light;
         if (mirror > t.reverb) {
             t.reverb = mirror;
             t.period = known ? face.depth_mm : p.row.r_mm - in.geometry.step_mm;
             t.next = 2 * t.period;
+            t.loss = face.reverb_loss;
         }
     }
     t.before_that = t.before;
@@ -138,7 +141,7 @@ double tail_power(const ReferenceInput& in, const Row& row, BeamLight& t) {
         power += t.gas * t.gas + line * line;
         if (off > 1) {
             t.next += t.period;
-            t.reverb *= kReverbLoss;
+            t.reverb *= t.loss;
         }
     }
     for (std::size_t i = 0; i < in.frame.needles.size(); ++i) {
@@ -178,8 +181,7 @@ class Beams {
                                  static_cast<double>(gaps_[spacing.line(n)]), n);
                 if (!f.effects.diaphragm) node.peak = 0;
             }
-            for (auto* per_beam : {&faces_.depth_mm, &faces_.dome_mm, &faces_.peak, &faces_.cosine})
-                per_beam->resize(gaps_.size());
+            faces_.resize(gaps_.size());
             join_faces(in_.geometry, spacing, nodes, faces_);
         }
         if (f.effects.streaks)
@@ -262,7 +264,8 @@ class Beams {
     Face face_of(int l) const {
         if (faces_.depth_mm.empty()) return {};
         const auto at = [&](const std::vector<float>& v) { return static_cast<double>(v[l]); };
-        return {at(faces_.depth_mm), at(faces_.dome_mm), at(faces_.peak), at(faces_.cosine)};
+        return {at(faces_.depth_mm), at(faces_.dome_mm), at(faces_.peak),
+                at(faces_.cosine),   at(faces_.tail),    at(faces_.reverb_loss)};
     }
 
     // The scatterers' share of the diaphragm's line, `past` mm behind it along the beam.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include <GLFW/glfw3.h>
 #include <imgui.h>
@@ -379,7 +380,9 @@ void Ui::draw_button(const Box& box,
         text({box.x + 2, box.bottom() - 24, box.w - 4, 20}, words, Type::small, ink, Align::centre);
         return;
     }
-    const float key_width = *style.key ? width(style.key, Type::small) + 12 : 0;
+    // Letters and F3 are the same on every keyboard; Space and Enter have names.
+    const std::string key_name = std::strlen(style.key) > 2 ? tr(style.key) : style.key;
+    const float key_width = key_name.empty() ? 0 : width(key_name, Type::small) + 12;
     const float icon_width = style.icon != Icon::none ? (words.empty() ? 24.0f : 32.0f) : 0;
     // Words that are long in some language take the padding too.
     const bool tight = icon_width + width(words, type) > box.w - 20;
@@ -408,7 +411,7 @@ void Ui::draw_button(const Box& box,
     const Box key{style.left ? box.right() - pad - key_width : x + width(words, type) + 10,
                   middle - 10, key_width, 20};
     outline(key, ink, 1, 4);
-    text(key, style.key, Type::small, ink, Align::centre);
+    text(key, key_name, Type::small, ink, Align::centre);
 }
 
 bool Ui::button(const char* id,

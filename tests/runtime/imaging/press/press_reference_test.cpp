@@ -5,6 +5,7 @@
 
 #include "runtime/imaging/press/plain_press.h"
 #include "runtime/imaging/press/press_support.h"
+#include "support/hard_case.h"
 
 namespace sonocase::testing {
 namespace {
@@ -37,17 +38,22 @@ auto map_of(const PlainPress& plain) {
 
 TEST(PressReference, TheFastFieldIsThePlainOneUpToItsIterations) {
     PressField field({});
+    HardCase iterated("fast field off the plain one, all iterations", HardCase::at_most, 0.06,
+                      "mm");
+    HardCase force("its force, off", HardCase::at_most, 0.03, "");
+    HardCase frame("with the iterations of a frame, over what is pressed", HardCase::at_most, 0.02,
+                   "");
     for (const double pressed_mm : {2.0, 8.0, 15.0}) {
         const Body body = vessels(pressed_mm);
         (void)press(field, body, {{3, 400, 400}, 1});
         const PlainPress plain(field.samples(), field.face(), 3);
         // All iterations: what is left is single precision, three Newton steps for the factor of a
         // column and a table of 0.375 mm.
-        EXPECT_LT(mean_distance(map_of(field), map_of(plain)), 0.06) << pressed_mm;
-        EXPECT_NEAR(field.state().force_n, plain.force_n(), 0.03 * plain.force_n()) << pressed_mm;
+        iterated.see(mean_distance(map_of(field), map_of(plain)));
+        force.see(std::abs(field.state().force_n / plain.force_n() - 1));
         (void)press(field, body);
         // With the iterations of a frame: 2 % of what tissue moves.
-        EXPECT_LT(mean_distance(map_of(field), map_of(plain)), 0.02 * pressed_mm) << pressed_mm;
+        frame.see(mean_distance(map_of(field), map_of(plain)) / pressed_mm);
     }
 }
 
@@ -69,6 +75,7 @@ TEST(PressReference, IncrementsConverge) {
 
 TEST(PressReference, RandomTissuesAgreeToo) {
     Random random(23);
+    HardCase off("fast field off the plain one, random tissues", HardCase::at_most, 0.25, "mm");
     PressField field({});
     for (int n = 0; n < 8; ++n) {
         const Body body = random_body(random);
@@ -79,7 +86,7 @@ TEST(PressReference, RandomTissuesAgreeToo) {
             const Point3 rest = field.pull_back({p.lateral_mm, 0, p.depth_mm - excess});
             return BeamPoint{rest.x, rest.z + excess};
         };
-        EXPECT_LT(mean_distance(fast, map_of(plain)), 0.25) << n;
+        off.see(mean_distance(fast, map_of(plain)));
     }
 }
 

@@ -202,6 +202,19 @@ TEST_F(WindowMended, TheSetUpShowsTheCourseOfTheResiduals) {
     EXPECT_GT(accent("course"), 300);
 }
 
+TEST_F(WindowMended, TheSetUpOpensOverAResultAndLeadsBackToIt) {
+    ASSERT_EQ(run("", "wait 6\nkey b\nwait 20\nkey b\nwait 6\n" + shot("result") +
+                          "key f3\nwait 4\n" + shot("set_up") + "key f3\nwait 4\n" + shot("back") +
+                          "key f3\nwait 4\nkey escape\nwait 4\n" + shot("escaped") + "quit\n")
+                  .status,
+              0);
+    EXPECT_TRUE(says("set_up", "Tracker") && says("set_up", "scanning"));
+    for (const char* page : {"result", "back", "escaped"}) {
+        EXPECT_TRUE(says(page, "replay")) << page;
+        EXPECT_FALSE(says(page, "scanning")) << page;
+    }
+}
+
 // A stream whose names say nothing: the set-up lists them, a click gives one its tool, and the
 // player keeps it.
 TEST_F(WindowMended, TheSetUpListsTheNamesThatWereHeardAndGivesThemTools) {
