@@ -103,7 +103,7 @@ struct SignatureCheck::State {
     std::vector<std::string> types;
     std::array<std::uint8_t, crypto_sign_ed25519_BYTES> signature{};
     std::string statement;
-    // Of the chunk that is being read, the first of `types` that is left.
+    // `next` is the first of `types` whose chunk has not been read to its end.
     std::size_t next = 0, at = 0;
     bool loaded = false;
     std::vector<std::uint8_t> unpacked;

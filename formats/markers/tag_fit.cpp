@@ -16,9 +16,9 @@ namespace {
 // The corners, then black, white, blur along u and along v, then Unknowns::beyond.
 constexpr int kCorners = 8, kBeyond = 12, kUnknowns = 16;
 constexpr double kMinBlur = 0.3, kMaxBlur = 6, kStartBlur = 0.8;  // pixels
-// Of white round the square, in cells. There a side of a body ends, and through the blur what lies
-// beyond it reaches the square's edge: another side's white or the ground. Taken for the tag's own
-// white it would move all four edges.
+// Half a cell of white surrounds the square. There a side of a body ends, and through the blur what
+// lies beyond it, another side's white or the ground, reaches the square's edge. Taken for the
+// tag's own white it would move all four edges.
 constexpr double kMargin = 0.5;
 constexpr double kMinNoise = 0.6;  // grey values: rounding alone has 0.3
 // Errors of neighbouring pixels go together (compression, blur of another shape, uneven light), so

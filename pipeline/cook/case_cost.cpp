@@ -108,7 +108,7 @@ CaseSize case_size(const Recipe& recipe) {
         const Grid grid = analytic_torso_grid({in.voxel_mm, in.voxel_mm, in.slice_mm}, in.body);
         voxels = static_cast<double>(grid.voxel_count());
         spacing_mm = grid.spacing_mm;
-        // Of a torso's organs, of tubes, and of a neck, whose map has much air.
+        // A torso's organs take the longest; a neck's map has much air.
         const double for_a_million = in.body.tubes ? 0.14 : in.body.neck_seed != 0 ? 0.05 : 0.38;
         size.sampling_s = for_a_million * voxels / 1e6;
     } else if (is_mesh_source(path)) {

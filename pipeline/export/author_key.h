@@ -27,7 +27,7 @@ std::string public_key_text(const PublicKey& key, const std::string& name);
 
 // Errors: text that is no such key; one that is encrypted.
 Result<AuthorKey> parse_author_key(std::string_view text, const std::string& where);
-// Of either file. Errors: the same.
+// Takes the public key from either file. Errors: as for the whole key.
 Result<PublicKey> parse_public_key(std::string_view text, const std::string& where);
 
 // "signed by NAME (fingerprint ...)" and the like; empty: the case has no signature.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// From the sensors of a reading to the tools; by itself, as a page takes it without the engine.
+// Turns the sensors of a reading into the tools' poses; a page takes this file without the engine.
 #include "runtime/engine/scan_engine.h"
 
 namespace sonocase::runtime::inline engine {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""clutter: what is bright goes to and fro between the layers of the wall and fades below it.
+"""clutter: bright echoes are reflected between the layers of the wall and fade below it.
 
 Without the effect fluid and vessels near the wall are black.
 """

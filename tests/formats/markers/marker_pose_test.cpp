@@ -207,12 +207,12 @@ TEST_F(MarkerPose, WhatLiesBeyondTheFoldsDoesNotMoveABlurredTag) {
     EXPECT_EQ(e.within, e.good);
 }
 
-// A board on the table, a probe that moves to and fro at up to 100 mm/s and turns, seen with motion
+// A board on the table, a probe that moves to both sides at up to 100 mm/s and turns, with motion
 // blur and a rolling shutter, hidden from one time to another.
 struct MovingRun {
     int good = 0, lost = 0, predicted = 0;
     double square_mm = 0, worst_mm = 0, worst_deg = 0;
-    // Of where it is when the pose has come, without and with prediction.
+    // How far it has gone on when the pose comes, without and with prediction.
     double late_mm = 0, predicted_mm = 0, predicted_worst_deg = 0;
     double rms_mm() const { return std::sqrt(square_mm / good); }
     double rms_late_mm() const { return std::sqrt(late_mm / predicted); }
