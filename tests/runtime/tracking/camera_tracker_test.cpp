@@ -74,6 +74,27 @@ TEST(CameraTracker, AVideoBecomesARecordingOfTheTruePoses) {
         const Point3 face{0, 0, -120};
         EXPECT_LT(distance(pose.tracker_from_tool * face, truth * face), 1.5) << i;
     }
+    // The same pictures one after another, the first of them with a preview of it within, as phones
+    // and some cameras keep them; and one alone.
+    std::vector<std::uint8_t> preview{0xFF, 0xE1};
+    preview.push_back(static_cast<std::uint8_t>((jpegs[3].size() + 2) >> 8));
+    preview.push_back(static_cast<std::uint8_t>(jpegs[3].size() + 2));
+    preview.insert(preview.end(), jpegs[3].begin(), jpegs[3].end());
+    std::string stream;
+    jpegs.erase(jpegs.begin() + 3);
+    for (const std::vector<std::uint8_t>& jpeg : jpegs) {
+        std::vector<std::uint8_t> kept = jpeg;
+        if (stream.empty()) kept.insert(kept.begin() + 2, preview.begin(), preview.end());
+        stream.append(kept.begin(), kept.end());
+    }
+    const auto streamed = load_camera_video(folder.write("probe.mjpeg", stream), options);
+    ASSERT_TRUE(streamed) << streamed.error().message();
+    ASSERT_EQ(streamed->probe.size(), jpegs.size());
+    for (const Pose& pose : streamed->probe) EXPECT_TRUE(pose.ok);
+    const auto alone = load_camera_video(
+        folder.write("one.jpg", std::string(jpegs[0].begin(), jpegs[0].end())), options);
+    ASSERT_TRUE(alone) << alone.error().message();
+    EXPECT_EQ(alone->probe.size(), 1u);
     // The same through the table of trackers, with a camera file and without.
     const std::string json = folder.write("camera.json", format_camera(options.setup));
     const auto made = make_tracker("camera:" + file + "," + json, {});
