@@ -544,25 +544,35 @@ TEST(IgtlTracker, AFloodTakesATenthOfACoreAndNoMemory) {
             tracker.event.notify();
         });
         const Flood sender(port, flood.message, flood.drips);
-        ASSERT_TRUE(tracker.eventually([&] {
-            const TrackerHealth health = tracker->health();
-            return flood.comes ? health.readings > 0 : health.connects > 0;
-        }));
+        // On a busy machine the sender and the tracker come to their turns late.
+        constexpr double kHangsS = 300;
+        ASSERT_TRUE(eventually(
+            tracker.event,
+            [&] {
+                const TrackerHealth health = tracker->health();
+                return flood.comes ? health.readings > 0 : health.connects > 0;
+            },
+            kHangsS));
         const auto start = Clock::now();
         const double before_s = process_seconds();
         const int woken_before = woken;
         const std::uint64_t had = tracker->health().readings;
         const double memory_before_mb = resident_mb();
-        Event pause;
-        while (seconds_since(start) < 0.5) pause.wait(0.05);
+        // For half a second, and until poses have gone on: however long that takes, the share of a
+        // core and the number of wakes are those of the time that has passed.
+        Event pause;  // not woken by poses: this thread counts as well
+        EXPECT_TRUE(eventually(
+            pause,
+            [&] {
+                return seconds_since(start) >= 0.5 &&
+                       (!flood.comes || tracker->health().readings > had);
+            },
+            kHangsS));
         const double wall_s = seconds_since(start), spent_s = process_seconds() - before_s;
         // A tenth of a core, what was saved up for it, and as much again for an unlucky measure.
         EXPECT_LT(spent_s, 0.1 * wall_s + 0.02 + 0.1);
         EXPECT_LT(woken - woken_before, 520 * wall_s);
         EXPECT_LT(resident_mb() - memory_before_mb, 30);
-        if (flood.comes) {
-            EXPECT_GT(tracker->health().readings, had);
-        }
         tracker->set_wake({});
     }
 }
