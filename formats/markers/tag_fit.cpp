@@ -217,8 +217,10 @@ bool sums_of(
         return false;
     // Along u the blur is that across the lines of constant u.
     const float det = std::abs(slope[0] * slope[3] - slope[1] * slope[2]);
-    const float px_u = det / std::hypot(slope[1], slope[3]);
-    const float px_v = det / std::hypot(slope[0], slope[2]);
+    // By roots, which are the same everywhere; hypot() is not, and its last digit would come out in
+    // the corners.
+    const float px_u = det / std::sqrt(slope[1] * slope[1] + slope[3] * slope[3]);
+    const float px_v = det / std::sqrt(slope[0] * slope[0] + slope[2] * slope[2]);
     const float inv_blur_u = px_u / static_cast<float>(at.blur_u);
     const float inv_blur_v = px_v / static_cast<float>(at.blur_v);
     constexpr float kNarrow = 4;  // standard deviations to a cell
