@@ -163,7 +163,7 @@ struct PlayedCamera {
     };
     Result<std::unique_ptr<PictureSource>> open() {
         if (busy)
-            return Error{"Another program uses the camera.", "/dev/video0", "close that program"};
+            return Error{"Another program uses the camera", "/dev/video0", "close that program"};
         if (!plugged) return Error{"No camera is connected", "", ""};
         return std::unique_ptr<PictureSource>(std::make_unique<Source>(*this));
     }
@@ -198,7 +198,7 @@ TEST(CameraTracker, ALiveCameraMayComeGoAndBeTaken) {
     EXPECT_TRUE(tracker.is_device());
     EXPECT_TRUE(says("No camera is connected"));
     camera.busy = true;
-    EXPECT_TRUE(says("Another program uses the camera."));
+    EXPECT_TRUE(says("/dev/video0: Another program uses the camera; close that program"));
     camera.busy = false;
     camera.plugged = true;
     TrackerReading reading;
