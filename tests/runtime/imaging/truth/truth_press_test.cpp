@@ -3,7 +3,7 @@
 // The truth of tissue that yields: what the picture shows, and not what lies there at rest.
 #include <optional>
 
-#include "pressed_block.h"
+#include "../pressed_block.h"
 #include "runtime/imaging/core/needle_shift.h"
 #include "support/hard_case.h"
 #include "truth_support.h"

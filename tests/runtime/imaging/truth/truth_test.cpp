@@ -9,9 +9,9 @@
 #include <cmath>
 #include <optional>
 
+#include "../pressed_block.h"
 #include "formats/files/load_save.h"
 #include "formats/scoring/anatomy.h"
-#include "pressed_block.h"
 #include "support/temporary_folder.h"
 #include "truth_support.h"
 

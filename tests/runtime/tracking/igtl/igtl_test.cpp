@@ -37,7 +37,7 @@ double seconds_since(Clock::time_point start) {
 // Checks the predicate whenever the tracker notifies and every 5 ms, because changes of its health
 // are not notified; false if it has not come true within `seconds`.
 template <class Predicate>
-bool eventually(Event& event, Predicate predicate, double seconds = 15) {
+bool seen_after_events(Event& event, Predicate predicate, double seconds = 15) {
     const auto start = Clock::now();
     while (!predicate()) {
         if (seconds_since(start) > seconds) return false;
@@ -58,7 +58,7 @@ struct NotifyingTracker {
     Tracker& operator*() const { return *tracker; }
     template <class Predicate>
     bool eventually(Predicate predicate) {
-        return runtime::eventually(event, predicate);
+        return seen_after_events(event, predicate);
     }
     Event event;
     std::unique_ptr<Tracker> tracker;
@@ -688,7 +688,7 @@ TEST(IgtlServer, SurvivesAThousandConnects) {
         if (i % 3 == 0) socket->write(Bytes(100, 0xFF));
     }
     Event never;  // the server does not notify when clients come and go
-    EXPECT_TRUE(eventually(never, [&] { return (*server)->clients() == 0; }));
+    EXPECT_TRUE(seen_after_events(never, [&] { return (*server)->clients() == 0; }));
     auto tracker = start_tracker(0, true);
     for (int i = 0; i < 200; ++i) {
         Result<Socket> socket =
