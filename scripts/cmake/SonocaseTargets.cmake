@@ -67,12 +67,15 @@ function(sonocase_doors variable folder)
   set(${variable} "${doors}" PARENT_SCOPE)
 endfunction()
 
-# sonocase_room(FOLDER [SOURCES ...] [PUBLIC ...] [PRIVATE ...]): the library of one folder; folder a/b becomes
-# target a_b. PUBLIC and PRIVATE name what it links: other rooms by their folder, third-party libraries by target. A
+# What a room that says SMALL is compiled with: for size where the rest is compiled for speed.
+set(SONOCASE_SMALL_OPTIONS $<$<CONFIG:Release>:-Os>)
+
+# sonocase_room(FOLDER [SMALL] [SOURCES ...] [PUBLIC ...] [PRIVATE ...]): the library of one folder; folder a/b becomes
+# target a_b. SMALL: no frame waits for it, and it is compiled for size. PUBLIC and PRIVATE name what it links: other rooms by their folder, third-party libraries by target. A
 # room sees only the headers of the rooms that it links, so the compiler enforces the dependency law and every arrow
 # below it.
 function(sonocase_room folder)
-  cmake_parse_arguments(arg "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(arg "SMALL" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   string(REPLACE "/" "_" name "${folder}")
   sonocase_doors(doors ${folder})
   foreach(scope PUBLIC PRIVATE)
@@ -85,12 +88,20 @@ function(sonocase_room folder)
     endforeach()
   endforeach()
   if(arg_SOURCES)
-    if(NOT TARGET sonocase_room_headers)
-      add_library(sonocase_room_headers STATIC)
-      sonocase_precompiled(sonocase_room_headers ${sonocase_std_headers})
+    set(headers sonocase_room_headers)
+    set(size "")
+    if(arg_SMALL)
+      set(headers sonocase_small_headers)
+      set(size ${SONOCASE_SMALL_OPTIONS})
+    endif()
+    if(NOT TARGET ${headers})
+      add_library(${headers} STATIC)
+      target_compile_options(${headers} PRIVATE ${size})
+      sonocase_precompiled(${headers} ${sonocase_std_headers})
     endif()
     add_library(${name} STATIC ${arg_SOURCES})
-    target_precompile_headers(${name} REUSE_FROM sonocase_room_headers)
+    target_compile_options(${name} PRIVATE ${size})
+    target_precompile_headers(${name} REUSE_FROM ${headers})
     target_include_directories(${name} PUBLIC "$<BUILD_INTERFACE:${doors}>")
     target_link_libraries(${name} PUBLIC ${PUBLIC_targets} PRIVATE sonocase_options ${PRIVATE_targets})
   else()
