@@ -99,6 +99,8 @@ TEST(PressedFrame, PixelsAreTheSameOnEveryInstructionSetAndThreadCount) {
 }
 
 TEST(PressedFrame, LiftedTheFrameOfBeforeComesBackByteForByte) {
+    HardCase trace("change of a frame after 25 mm of pressing, lifted again", HardCase::at_most, 0,
+                   "grey");
     for (const ImageModel model : {ImageModel::physical, ImageModel::paper})
         for (const RendererKind kind : {RendererKind::fast, RendererKind::reference}) {
             RenderOptions options = block_picture(model, 96, kind);
@@ -113,7 +115,7 @@ TEST(PressedFrame, LiftedTheFrameOfBeforeComesBackByteForByte) {
             };
             const auto before = frame(-0.5), pressed = frame(6), deep = frame(25);
             EXPECT_GT(renderer->press().force_n, 5);
-            EXPECT_TRUE(frame(-0.5) == before);
+            trace.see(compare(frame(-0.5), before).worst);
             EXPECT_FALSE(renderer->press().pressed);
             EXPECT_EQ(renderer->press().force_n, 0);
             EXPECT_TRUE(frame(6) == pressed);
@@ -324,6 +326,7 @@ TEST(PressedFrame, BoneHoldsTheFace) {
 }
 
 TEST(PressedFrame, AnyPoseGivesAPicture) {
+    HardCase least("least force of 60 poses for each probe", HardCase::at_least, 0, "N");
     for (const ImageModel model : {ImageModel::physical, ImageModel::paper})
         for (const Exercise& exercise : block_exercises()) {
             auto renderer = Renderer::create(pressed_block(), exercise, block_picture(model));
@@ -336,7 +339,7 @@ TEST(PressedFrame, AnyPoseGivesAPicture) {
                 const FrameStatus status = renderer->render(input, pixels);
                 EXPECT_NE(status, FrameStatus::held_bad_pose);
                 EXPECT_TRUE(std::isfinite(renderer->press().force_n));
-                EXPECT_GE(renderer->press().force_n, 0);
+                least.see(renderer->press().force_n);
             }
             FrameInput bad;
             bad.mannequin_from_probe.translation.z = NAN;

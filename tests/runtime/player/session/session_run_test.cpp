@@ -10,6 +10,7 @@
 #include "runtime/player/session/clock.h"
 #include "runtime/recording/session_words.h"
 #include "runtime/tracking/replay_tracker.h"
+#include "support/hard_case.h"
 #include "support/random.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"
@@ -199,10 +200,12 @@ TEST(SessionRun, AJumpInAReplayLeadsToTheStateOfPlayingIt) {
         double from_s, by_s;
     };
     // Over injections, over all of it, back before the first act, back between two drains.
+    sonocase::testing::HardCase off("volume drained, after a jump off that of playing",
+                                    sonocase::testing::HardCase::at_most, 0, "ml");
     for (const Jump jump : {Jump{0.2, 3.5}, {0.1, 5.5}, {4.5, -4.3}, {5, -1.5}}) {
         const ProcedureRun run = replay(jump.from_s, jump.by_s);
         EXPECT_EQ(run.state().injected_ml, played.state().injected_ml) << jump.by_s;
-        EXPECT_EQ(run.state().drained_ml, played.state().drained_ml) << jump.by_s;
+        off.see(std::abs(run.state().drained_ml - played.state().drained_ml));
         EXPECT_EQ(run.scene().target_scale[0], played.scene().target_scale[0]) << jump.by_s;
         EXPECT_EQ(run.state().pool_count, played.state().pool_count) << jump.by_s;
         const ProcedureResult list = run.result(), wanted = played.result();
