@@ -301,7 +301,8 @@ void find_unknown(const FitContext& s,
     const double displaced_inside = displaced_mm(s, w->registration, s.inside),
                  slid = slid_mm(s, *w);
     const auto inside = [&](const QuadraticTrust& trust) {
-        return std::hypot(beyond_quadratic(trust) * trust.inside_mm, displaced_inside, slid);
+        return std::hypot(std::hypot(beyond_quadratic(trust) * trust.inside_mm, displaced_inside),
+                          slid);
     };
     w->inside_mm = inside(w->trust);
     QuadraticTrust held;
@@ -316,7 +317,7 @@ void find_unknown(const FitContext& s,
         const double displaced = displaced_mm(s, w->registration, place.points);
         const auto said = [&](const QuadraticTrust& trust) {
             const double spread = beyond_quadratic(trust) * spread_of_draws(place, judged, trust);
-            return quantiles(std::hypot(spread, displaced, slid));
+            return quantiles(std::hypot(std::hypot(spread, displaced), slid));
         };
         OrganUnknown unknown;
         unknown.label = place.label;
@@ -324,7 +325,7 @@ void find_unknown(const FitContext& s,
         if (!others.empty()) {
             const double halves = spread_of_refits(s, place, w->registration, others);
             unknown.halves_p90_mm = kP90OfRms * halves;
-            unknown.refits = quantiles(std::hypot(halves, displaced, slid));
+            unknown.refits = quantiles(std::hypot(std::hypot(halves, displaced), slid));
         }
         const Spread &a = unknown.covariance, &b = unknown.refits;
         unknown.median_mm = std::max(a.median_mm, b.median_mm);
