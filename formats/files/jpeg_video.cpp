@@ -18,11 +18,54 @@ bool named(std::span<const std::uint8_t> b, std::size_t at, const char* name) {
     return std::memcmp(b.data() + at, name, 4) == 0;
 }
 
+// Where the JPEG that begins at `from` ends; the file's end where it is cut off. Pictures within a
+// picture, such as a phone's preview, are passed over with the segment that they lie in.
+std::size_t end_of_jpeg(std::span<const std::uint8_t> b, std::size_t from) {
+    constexpr std::uint8_t kBegin = 0xD8, kEnd = 0xD9, kScan = 0xDA;
+    std::size_t at = from + 2;
+    while (at + 2 <= b.size()) {
+        const std::uint8_t code = b[at + 1];
+        const bool alone = code <= 0x01 || code == 0xFF || (code >= 0xD0 && code <= 0xD7);
+        if (b[at] != 0xFF || alone) {
+            ++at;  // of a scan's data
+            continue;
+        }
+        if (code == kEnd) return at + 2;
+        if (code == kBegin) return at;  // this one was cut off
+        if (at + 4 > b.size()) break;
+        at += 2 + (b[at + 2] << 8 | b[at + 3]);
+        if (code != kScan) continue;
+        while (at + 1 < b.size() &&
+               !(b[at] == 0xFF && b[at + 1] >= 0xC0 && (b[at + 1] < 0xD0 || b[at + 1] > 0xD7)))
+            ++at;
+    }
+    return b.size();
+}
+
+bool begins_jpeg(std::span<const std::uint8_t> b, std::size_t at) {
+    return at + 3 <= b.size() && b[at] == 0xFF && b[at + 1] == 0xD8 && b[at + 2] == 0xFF;
+}
+
 }  // namespace
 
-Result<JpegVideo> parse_avi(std::span<const std::uint8_t> b, const std::string& where) {
-    const Error no_avi{"no AVI video", where,
-                       "use an AVI of JPEG pictures (MJPG), or a folder of .jpg files"};
+Result<JpegVideo> parse_jpeg_video(std::span<const std::uint8_t> b, const std::string& where) {
+    const Error no_avi{"no video of JPEG pictures", where,
+                       "use an AVI of them (MJPG), a file of them one after another, or a folder "
+                       "of .jpg files"};
+    if (begins_jpeg(b, 0)) {
+        JpegVideo pictures;
+        for (std::size_t at = 0; at < b.size();) {
+            if (!begins_jpeg(b, at)) {
+                ++at;
+                continue;
+            }
+            const std::size_t end = end_of_jpeg(b, at);
+            pictures.pictures.emplace_back(b.begin() + static_cast<std::ptrdiff_t>(at),
+                                           b.begin() + static_cast<std::ptrdiff_t>(end));
+            at = end;
+        }
+        return pictures;
+    }
     if (b.size() < 12 || !named(b, 0, "RIFF") || !named(b, 8, "AVI ")) return no_avi;
     JpegVideo video;
     bool is_mjpg = false;
@@ -56,7 +99,7 @@ Result<JpegVideo> load_jpeg_video(const std::string& path) {
     std::error_code ignored;
     if (!fs::is_directory(path, ignored)) {
         SONOCASE_TRY(const std::vector<std::uint8_t> bytes, read_file(path));
-        return parse_avi(bytes, path);
+        return parse_jpeg_video(bytes, path);
     }
     std::vector<std::string> files;
     for (const auto& entry : fs::directory_iterator(path, ignored)) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Videos of a camera as files: an AVI whose pictures are JPEG, as cameras write it, or a folder of
-// JPEG files in the order of their names.
+// Videos of a camera as files: an AVI whose pictures are JPEG, as cameras write it; JPEG pictures
+// one after another, as their stream is kept, or one alone; or a folder of JPEG files in the order
+// of their names.
 #pragma once
 
 #include <cstdint>
@@ -18,9 +19,9 @@ struct JpegVideo {
     double rate_hz = 30;
 };
 
-// Errors: no AVI, another codec than MJPG, no pictures, a chunk that leaves the file.
-Result<JpegVideo> parse_avi(std::span<const std::uint8_t> bytes, const std::string& where);
-// Errors: those of parse_avi and of reading files; a folder without .jpg or .jpeg files.
+// Errors: neither an AVI of MJPG nor a JPEG, no pictures. A last picture that is cut off stays so.
+Result<JpegVideo> parse_jpeg_video(std::span<const std::uint8_t> bytes, const std::string& where);
+// Errors: those of parse_jpeg_video and of reading files; a folder without .jpg or .jpeg files.
 Result<JpegVideo> load_jpeg_video(const std::string& path);
 
 }  // namespace sonocase

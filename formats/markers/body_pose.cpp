@@ -60,8 +60,8 @@ Sums sums_of(const CameraModel& camera,
         for (int k = 0; k < 4; ++k) {
             // Outwards along both edges that meet here.
             const Pixel a = at[(k + 3) % 4], b = at[k], c = at[(k + 1) % 4];
-            const double in = std::hypot(b.x - a.x, b.y - a.y),
-                         on = std::hypot(c.x - b.x, c.y - b.y);
+            const auto length = [](double x, double y) { return std::sqrt(x * x + y * y); };
+            const double in = length(b.x - a.x, b.y - a.y), on = length(c.x - b.x, c.y - b.y);
             const double ox = (b.x - a.x) / in - (c.x - b.x) / on;
             const double oy = (b.y - a.y) / in - (c.y - b.y) / on;
             rows(2 * k, 6) = ox, rows(2 * k + 1, 6) = oy;

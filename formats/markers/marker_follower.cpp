@@ -10,6 +10,8 @@ namespace sonocase {
 namespace {
 
 constexpr double kTrustS = 0.15;  // how long a pose helps to find the next
+// How long it is looked for where it was: what a hand hides mostly comes back there.
+constexpr double kRememberedS = 2;
 
 // The board lies still on what it is glued to, and a camera mostly stands: a pose that agrees with
 // the one before is averaged with it.
@@ -78,8 +80,9 @@ const MarkerBody* MarkerFollower::body(MarkerRole role) const {
 
 std::optional<Rigid> MarkerFollower::expected(MarkerRole role, double time_s) const {
     const Track& track = tracks_[role == MarkerRole::probe ? 0 : 1];
-    if (!track.seen || track.time_s < last_s_ || time_s - track.time_s > kTrustS) return {};
+    if (!track.seen || time_s - track.time_s > kRememberedS) return {};
     Rigid pose = track.camera_from_body;
+    if (track.time_s < last_s_ || time_s - track.time_s > kTrustS) return pose;
     // Times of a browser's camera come in clumps: two a few milliseconds apart tell no speed.
     constexpr double kMaxPeriods = 3;
     if (track.age_s > 0)
@@ -116,6 +119,7 @@ FollowerPicture MarkerFollower::follow(std::span<const SeenTag> seen,
     const bool board_known =
         !options_.with_board || (board_ && time_s - board_s_ <= options_.board_hidden_after_s);
 
+    bool misfit = false;
     for (const MarkerRole role : {MarkerRole::probe, MarkerRole::needle}) {
         const std::size_t index = role == MarkerRole::probe ? 0 : 1;
         Track& track = tracks_[index];
@@ -124,6 +128,16 @@ FollowerPicture MarkerFollower::follow(std::span<const SeenTag> seen,
         const std::optional<BodyPose> pose =
             find(role, seen, twice, recent ? &track.camera_from_body : nullptr);
         reading.world_from_body = track.world_from_body;
+        // A finger or a blurred picture does not last. What lies on no body is not followed, so that
+        // it has a pose in some pictures alone.
+        constexpr int kMisfits = 8, kManyTags = 3;
+        constexpr double kMisfitS = 0.5;
+        if (pose) {
+            const bool misfits = pose->tags >= kManyTags && pose->residual > options_.good_residual;
+            track.misfits = misfits ? track.misfits + 1 : 0;
+            track.posed_s = time_s;
+        }
+        misfit = misfit || (track.misfits >= kMisfits && time_s - track.posed_s < kMisfitS);
         if (!pose) continue;
         const Point3 tool_body = body(role)->body_from_tool * Point3{};
         double sigma_mm = worst_sigma_mm(*pose, tool_body), sigma_rad = worst_sigma_rad(*pose);
@@ -164,7 +178,9 @@ FollowerPicture MarkerFollower::follow(std::span<const SeenTag> seen,
         reading.point_covariance = turned(point_covariance(*pose, tool_body), world_from_camera);
         reading.turn_covariance = turned(turn_covariance(*pose), world_from_camera);
         const double age_s = recent ? time_s - track.time_s : 0;
-        track = {true, time_s, camera_from_body, world_from_body, track.camera_from_body, age_s};
+        track.before = track.camera_from_body, track.age_s = age_s;
+        track.seen = true, track.time_s = time_s;
+        track.camera_from_body = camera_from_body, track.world_from_body = world_from_body;
     }
 
     if (!twice.empty()) {
@@ -175,6 +191,10 @@ FollowerPicture MarkerFollower::follow(std::span<const SeenTag> seen,
     } else if (ours > 0 && options_.with_board && !board_known) {
         out.problem =
             "The board is not in view: place it on the mannequin so that the camera sees it.";
+    } else if (misfit) {
+        out.problem =
+            "Tags of a body do not lie as they were drawn: fold its sheet, or measure it as it was "
+            "glued (sonocase calibrate body).";
     }
     return out;
 }

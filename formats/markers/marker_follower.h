@@ -69,8 +69,8 @@ class MarkerFollower {
                            int foreign,
                            double time_s);
 
-    // camera_from_body at a time, going on as in the last two pictures; nothing: it was not
-    // followed in the last of them.
+    // camera_from_body at a time, going on as in the last two pictures, or as it was where it was
+    // not followed in the last of them; nothing: not for two seconds.
     std::optional<Rigid> expected(MarkerRole role, double time_s) const;
     // camera_from_board, if it was seen within the last half second.
     std::optional<Rigid> expected_board() const;
@@ -89,6 +89,8 @@ class MarkerFollower {
         // Of the picture before; age_s: how long before, 0: it was not followed there.
         Rigid before;
         double age_s = 0;
+        int misfits = 0;  // poses in a row whose tags lie on no such body
+        double posed_s = 0;
     };
     std::optional<BodyPose> find(MarkerRole role,
                                  std::span<const SeenTag> seen,

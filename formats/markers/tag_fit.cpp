@@ -104,26 +104,35 @@ inline bool beyond_weights(const BellTable& table, float at, float inv_blur, Bey
     return true;
 }
 
-// The homography that takes (u, v) = (0, 0), (8, 0), (8, 8), (0, 8), counted in cells from the
-// lower left corner, to the corners (Heckbert 1989), about their middle.
-class Quad {
-  public:
-    explicit Quad(const std::array<Pixel, 4>& p) {
+// The homography that takes (u, v) = (0, 0), (1, 0), (1, 1), (0, 1) to four points (Heckbert 1989).
+struct UnitSquare {
+    Pixel p0;
+    double ax, ay, bx, by, g, h;  // columns by u and by v from p0, and the lower row
+    explicit UnitSquare(const std::array<Pixel, 4>& p) : p0(p[0]) {
         const double sx = p[0].x - p[1].x + p[2].x - p[3].x, sy = p[0].y - p[1].y + p[2].y - p[3].y;
         const double dx1 = p[1].x - p[2].x, dx2 = p[3].x - p[2].x;
         const double dy1 = p[1].y - p[2].y, dy2 = p[3].y - p[2].y;
         const double det = dx1 * dy2 - dx2 * dy1;
-        const double g = (sx * dy2 - dx2 * sy) / det, h = (dx1 * sy - sx * dy1) / det;
-        // Columns by u and by v from p[0], which is (0, 0).
-        const double ax = p[1].x - p[0].x + g * (p[1].x - p[0].x);
-        const double bx = p[3].x - p[0].x + h * (p[3].x - p[0].x);
-        const double ay = p[1].y - p[0].y + g * (p[1].y - p[0].y);
-        const double by = p[3].y - p[0].y + h * (p[3].y - p[0].y);
+        g = (sx * dy2 - dx2 * sy) / det, h = (dx1 * sy - sx * dy1) / det;
+        ax = p[1].x - p[0].x + g * (p[1].x - p[0].x), ay = p[1].y - p[0].y + g * (p[1].y - p[0].y);
+        bx = p[3].x - p[0].x + h * (p[3].x - p[0].x), by = p[3].y - p[0].y + h * (p[3].y - p[0].y);
+    }
+    Pixel at(double u, double v) const {
+        const double w = 1 / (g * u + h * v + 1);
+        return {p0.x + (ax * u + bx * v) * w, p0.y + (ay * u + by * v) * w};
+    }
+};
+
+// The same with u and v counted in cells from the lower left corner, backwards.
+class Quad {
+  public:
+    explicit Quad(const std::array<Pixel, 4>& p) {
+        const UnitSquare square(p);
         x0_ = p[0].x, y0_ = p[0].y;
         const double scale = 1.0 / kTagCells;
-        ax_ = static_cast<float>(ax * scale), bx_ = static_cast<float>(bx * scale);
-        ay_ = static_cast<float>(ay * scale), by_ = static_cast<float>(by * scale);
-        g_ = static_cast<float>(g * scale), h_ = static_cast<float>(h * scale);
+        ax_ = static_cast<float>(square.ax * scale), bx_ = static_cast<float>(square.bx * scale);
+        ay_ = static_cast<float>(square.ay * scale), by_ = static_cast<float>(square.by * scale);
+        g_ = static_cast<float>(square.g * scale), h_ = static_cast<float>(square.h * scale);
     }
     // (u, v) of a pixel, and the change of the pixel with u and v: 2 x 2, row by row.
     bool inside(double x, double y, float& u, float& v, float* slope) const {
@@ -208,8 +217,10 @@ bool sums_of(
         return false;
     // Along u the blur is that across the lines of constant u.
     const float det = std::abs(slope[0] * slope[3] - slope[1] * slope[2]);
-    const float px_u = det / std::hypot(slope[1], slope[3]);
-    const float px_v = det / std::hypot(slope[0], slope[2]);
+    // By roots, which are the same everywhere; hypot() is not, and its last digit would come out in
+    // the corners.
+    const float px_u = det / std::sqrt(slope[1] * slope[1] + slope[3] * slope[3]);
+    const float px_v = det / std::sqrt(slope[0] * slope[0] + slope[2] * slope[2]);
     const float inv_blur_u = px_u / static_cast<float>(at.blur_u);
     const float inv_blur_v = px_v / static_cast<float>(at.blur_v);
     constexpr float kNarrow = 4;  // standard deviations to a cell
@@ -496,6 +507,42 @@ bool fit_tag(const GreyPicture& picture, SeenTag& tag, int max_pixels) {
     tag.residual = residual;
     tag.blur_px = std::max(at.blur_u, at.blur_v);
     return true;
+}
+
+std::array<Pixel, 4> bend_of_tag(const CameraModel& camera, const std::array<Pixel, 4>& corners) {
+    std::array<Pixel, 4> bend{};
+    if (camera.k1 == 0 && camera.k2 == 0 && camera.k3 == 0 && camera.p1 == 0 && camera.p2 == 0)
+        return bend;
+    // Without the lens edges are straight: a homography takes (u, v) in [0, 1] to directions.
+    std::array<Pixel, 4> straight;
+    for (int k = 0; k < 4; ++k) {
+        const Vector3 ray = direction_at(camera, corners[k]);
+        straight[k] = {ray.x / ray.z, ray.y / ray.z};
+    }
+    const UnitSquare seen(corners), without(straight);
+    // The straight pattern goes to where the points of the bent one are nearest, by least squares;
+    // a corner that moves takes its share of each along.
+    Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
+    Eigen::Matrix<double, 4, 2> right = Eigen::Matrix<double, 4, 2>::Zero();
+    for (int i = 0; i <= kTagCells; ++i)
+        for (int j = 0; j <= kTagCells; ++j) {
+            const double u = static_cast<double>(i) / kTagCells,
+                         v = static_cast<double>(j) / kTagCells;
+            const Pixel ray = without.at(u, v), laid = seen.at(u, v);
+            Pixel shown;
+            if (!project(camera, {1e3 * ray.x, 1e3 * ray.y, 1e3}, shown, nullptr)) return {};
+            const Eigen::Vector4d share((1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v);
+            normal += share * share.transpose();
+            right += share * Eigen::RowVector2d(shown.x - laid.x, shown.y - laid.y);
+        }
+    const Eigen::Matrix<double, 4, 2> moved = normal.llt().solve(right);
+    for (int k = 0; k < 4; ++k) bend[k] = {moved(k, 0), moved(k, 1)};
+    return bend;
+}
+
+void unbend_tag(const CameraModel& camera, SeenTag& tag) {
+    const std::array<Pixel, 4> bend = bend_of_tag(camera, tag.corners);
+    for (int k = 0; k < 4; ++k) tag.corners[k].x -= bend[k].x, tag.corners[k].y -= bend[k].y;
 }
 
 }  // namespace sonocase

@@ -202,6 +202,14 @@ int structure_cell(double voxel_mm) {
     return 1;
 }
 
+double structure_depth_bytes(double voxel_mm) {
+    const int cell = structure_cell(voxel_mm);
+    double bytes = 0;
+    for (const double apart_mm : {kSkinDepthMm, kFatDepthMm})
+        bytes += sizeof(float) / std::pow(cell * depth_step(cell * voxel_mm, apart_mm), 3);
+    return bytes;
+}
+
 Result<BakeStructureResult> bake_structure_in_cells(const LabelVolume& cooked,
                                                     std::span<const Tissue> tissues,
                                                     const BakeStructureOptions& options,

@@ -77,6 +77,10 @@ inline constexpr double kStructureCellMm = 1;
 // Voxels per edge of a cell: 1, 2 or 4, the largest that is within kStructureCellMm.
 int structure_cell(double voxel_mm);
 
+// Bytes for a cooked voxel of the depths below the skin and through fat, which are held while
+// structure is baked: samples every 2 and every 3 mm, in whole cells.
+double structure_depth_bytes(double voxel_mm);
+
 // Like bake_structure; echo_offset is on the grid of `cooked`.
 Result<BakeStructureResult> bake_structure_in_cells(const LabelVolume& cooked,
                                                     std::span<const Tissue> tissues,

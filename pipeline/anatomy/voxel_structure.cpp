@@ -74,11 +74,11 @@ void extend(float reach, CoarseField* field) {
 // Shows where fat is the subcutaneous layer rather than the fat around organs:
 // length, mm, of the shortest path from the skin to each sample through skin and fat alone, along
 // the axes of the grid (up to sqrt(3) longer than a straight line); 250 where no such path of up to
-// 150 mm exists. Samples every 3 mm.
+// 150 mm exists.
 CoarseField distance_through_fat(const LabelVolume& labels, const std::vector<LabelFacts>& facts) {
     const double voxel_mm = labels.grid.spacing_mm.x;
     CoarseField field;
-    field.step = std::max(1, static_cast<int>(std::lround(3 / voxel_mm)));
+    field.step = depth_step(voxel_mm, kFatDepthMm);
     const Int3 fine = labels.grid.size;
     const int s = field.step;
     field.size = {(fine.x + s - 1) / s, (fine.y + s - 1) / s, (fine.z + s - 1) / s};
@@ -118,13 +118,17 @@ float sparse(float g) {
 }
 
 CoarseField depth_below_skin(const LabelVolume& labels) {
-    const int step = std::max(1, static_cast<int>(std::lround(2 / labels.grid.spacing_mm.x)));
+    const int step = depth_step(labels.grid.spacing_mm.x, kSkinDepthMm);
     return distance_inside(labels.grid.size, step, [&](int i, int j, int k) {
         return labels.voxels[labels.grid.index(i, j, k)] != 0;
     });
 }
 
 }  // namespace
+
+int depth_step(double voxel_mm, double apart_mm) {
+    return std::max(1, static_cast<int>(std::lround(apart_mm / voxel_mm)));
+}
 
 VoxelStructure::VoxelStructure(const LabelVolume& labels,
                                const std::vector<const Tissue*>& tissue_of,

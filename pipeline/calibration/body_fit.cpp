@@ -21,7 +21,6 @@ namespace {
 // Where a tag may be before any picture was seen. It holds the body's frame while Ceres runs, and
 // is wide enough not to draw the answer.
 constexpr double kPriorMm = 5, kPriorRad = 0.1;
-constexpr double kHuber = 7;          // standard deviations of the eight numbers of a tag together
 using Place = std::array<double, 6>;  // rotation vector, translation
 
 // The corners of one tag in one picture; beside the pose and the tag's place the outward move of
@@ -32,38 +31,24 @@ struct TagCost {
     const SeenTag* seen;
     template <class T>
     bool operator()(const T* pose, const T* built, const T* bleed, T* residual) const {
-        T lens[kIntrinsics], at[4][2], off[8];
+        T lens[kIntrinsics], view[4][3], off[8];
         for (int k = 0; k < kIntrinsics; ++k) lens[k] = T(camera[k]);
         const double h = 0.5 * drawn.edge_mm;
         const double square[4][2] = {{-h, -h}, {h, -h}, {h, h}, {-h, h}};
         const Rigid& frame = drawn.body_from_tag;
         for (int k = 0; k < 4; ++k) {
             const T corner[3] = {T(square[k][0]), T(square[k][1]), T(0)};
-            T tag[3], body[3], view[3];
+            T tag[3], body[3];
             ceres::AngleAxisRotatePoint(built, corner, tag);
             for (int a = 0; a < 3; ++a) tag[a] += built[3 + a];
             for (int a = 0; a < 3; ++a)
                 body[a] = frame.rotation(a, 0) * tag[0] + frame.rotation(a, 1) * tag[1] +
                           frame.rotation(a, 2) * tag[2] + frame.translation[a];
-            ceres::AngleAxisRotatePoint(pose, body, view);
-            for (int a = 0; a < 3; ++a) view[a] += pose[3 + a];
-            lens_pixel(lens, view, at[k]);
+            ceres::AngleAxisRotatePoint(pose, body, view[k]);
+            for (int a = 0; a < 3; ++a) view[k][a] += pose[3 + a];
         }
-        for (int k = 0; k < 4; ++k) {
-            const T* a = at[(k + 3) % 4];
-            const T* b = at[k];
-            const T* c = at[(k + 1) % 4];
-            const T in = ceres::hypot(b[0] - a[0], b[1] - a[1]);
-            const T on = ceres::hypot(c[0] - b[0], c[1] - b[1]);
-            for (int axis = 0; axis < 2; ++axis)
-                off[2 * k + axis] =
-                    b[axis] + bleed[0] * ((b[axis] - a[axis]) / in - (c[axis] - b[axis]) / on) -
-                    (axis == 0 ? seen->corners[k].x : seen->corners[k].y);
-        }
-        for (int r = 0; r < 8; ++r) {
-            residual[r] = T(0);
-            for (int c = r; c < 8; ++c) residual[r] += seen->whitening[8 * r + c] * off[c];
-        }
+        tag_off_px(lens, view, bleed[0], *seen, off);
+        whiten(*seen, off, residual);
         return true;
     }
 };
@@ -76,14 +61,6 @@ struct PriorCost {
         return true;
     }
 };
-struct BleedCost {
-    template <class T>
-    bool operator()(const T* bleed, T* residual) const {
-        residual[0] = bleed[0] / kBleed;
-        return true;
-    }
-};
-
 Rigid rigid_of(const Place& p) {
     const Vector3 turn{p[0], p[1], p[2]};
     const double angle = norm(turn);
@@ -202,7 +179,7 @@ void set_up(Adjustment& a,
         for (const Sight& s : view.sights)
             a.problem.AddResidualBlock(new ceres::AutoDiffCostFunction<TagCost, 8, 6, 6, 1>(
                                            new TagCost{lens, drawn.tags[s.tag], s.seen}),
-                                       new ceres::HuberLoss(kHuber), view.pose.data(),
+                                       new ceres::HuberLoss(kHuberOfTag), view.pose.data(),
                                        places[s.tag].data(), &bleed);
         a.blocks.push_back(view.pose.data());
     }
@@ -366,7 +343,7 @@ BodyFit fit_body(const std::vector<MarkerView>& seen,
                     // What is far off weighs little in the answer, and here.
                     double sum = 0;
                     for (const double x : r) sum += x * x;
-                    square += std::min(sum, kHuber * kHuber);
+                    square += std::min(sum, kHuberOfTag * kHuberOfTag);
                     count += 8;
                 }
             }

@@ -42,8 +42,8 @@ struct BodyFit {
     std::vector<std::string> warnings;
 };
 
-// views: pictures of one calibrated camera, each with two tags of the body at least; those with
-// fewer are left out. Deterministic. Cost: about a second for 80 views.
+// views: pictures of one calibrated camera, each with two tags of the body at least, after
+// unbend_tag(); those with fewer are left out. Deterministic. Cost: about a second for 80 views.
 BodyFit fit_body(const std::vector<MarkerView>& views,
                  const MarkerBody& drawn,
                  const CameraModel& camera,

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // A camera's focal lengths, middle and distortion from pictures of the board held at various tilts:
-// least squares over all pictures at once, by Ceres (Zhang, "A flexible new technique for camera
-// calibration", PAMI 2000; distortion as in formats/markers/camera_model.h).
+// least squares over all pictures at once, each tag with its covariance, by Ceres (Zhang, "A
+// flexible new technique for camera calibration", PAMI 2000; distortion as in
+// formats/markers/camera_model.h).
 #pragma once
 
 #include <string>
@@ -39,8 +40,9 @@ struct CameraFit {
     std::vector<std::string> warnings;
 };
 
-// views: pictures of one size, each with three tags of the board at least. Deterministic.
-// Cost: about a second for 40 views.
+// views: pictures of one size, each with three tags of the board at least, as fit_tag() has them.
+// Deterministic.
+// Cost: about two seconds for 40 views.
 CameraFit fit_camera(const std::vector<MarkerView>& views,
                      const MarkerBody& board,
                      int width_px,

@@ -19,6 +19,8 @@ constexpr double kBlockMm = 60;
 constexpr double kUpError = 0.1;
 // Slopes that differ from the quadratic's are about three times as steep as those expected of it.
 constexpr double kFarther = 3;
+// Share of the readings, and of the skin, of which a fit that has not slid reaches more.
+constexpr double kReached = 0.5;
 // The excess of the design effect at which a quadratic and another body are as likely.
 constexpr double kHalfSure = 1;
 
@@ -207,6 +209,23 @@ double displaced_mm(const FitContext& s,
     return std::sqrt(sum / static_cast<double>(points.size()));
 }
 
+// Where neither half of the readings has its skin nor half of the skin its readings, the body has
+// slid off them: it must lie as far from here as they lie from it (95th percentile).
+double slid_mm(const FitContext& s, const WarpFit& w) {
+    if (w.fit.coverage >= kReached || w.fit.skin_coverage >= kReached) return 0;
+    std::vector<Point3> skin;
+    for (Point3 p : s.fine.points)
+        skin.push_back(
+            Point3{} +
+            (mannequin_from_ct(w.registration, s.fine.origin + (p - Point3{})) - s.target.origin));
+    const PointIndex index(skin);
+    std::vector<double> away;
+    for (Point3 p : s.target.points) away.push_back(distance(p, skin[index.nearest(p)]));
+    if (away.empty()) return 0;
+    std::sort(away.begin(), away.end());
+    return away[away.size() * 95 / 100];
+}
+
 // Of maps drawn from the posterior, root mean square over draws and points.
 double spread_of_draws(const Places& place, const RigidQuadratic& q, const QuadraticTrust& trust) {
     double sum = 0;
@@ -279,9 +298,11 @@ void find_unknown(const FitContext& s,
                   const Progress& progress,
                   WarpFit* w) {
     report_progress(progress, 0.9, "what the readings leave open");
-    const double displaced_inside = displaced_mm(s, w->registration, s.inside);
+    const double displaced_inside = displaced_mm(s, w->registration, s.inside),
+                 slid = slid_mm(s, *w);
     const auto inside = [&](const QuadraticTrust& trust) {
-        return std::hypot(beyond_quadratic(trust) * trust.inside_mm, displaced_inside);
+        return std::hypot(std::hypot(beyond_quadratic(trust) * trust.inside_mm, displaced_inside),
+                          slid);
     };
     w->inside_mm = inside(w->trust);
     QuadraticTrust held;
@@ -296,7 +317,7 @@ void find_unknown(const FitContext& s,
         const double displaced = displaced_mm(s, w->registration, place.points);
         const auto said = [&](const QuadraticTrust& trust) {
             const double spread = beyond_quadratic(trust) * spread_of_draws(place, judged, trust);
-            return quantiles(std::hypot(spread, displaced));
+            return quantiles(std::hypot(std::hypot(spread, displaced), slid));
         };
         OrganUnknown unknown;
         unknown.label = place.label;
@@ -304,7 +325,7 @@ void find_unknown(const FitContext& s,
         if (!others.empty()) {
             const double halves = spread_of_refits(s, place, w->registration, others);
             unknown.halves_p90_mm = kP90OfRms * halves;
-            unknown.refits = quantiles(std::hypot(halves, displaced));
+            unknown.refits = quantiles(std::hypot(std::hypot(halves, displaced), slid));
         }
         const Spread &a = unknown.covariance, &b = unknown.refits;
         unknown.median_mm = std::max(a.median_mm, b.median_mm);

@@ -11,7 +11,8 @@
 //               (McCarthy 1969), without its repeated readings.
 //
 // To each is added what the displacement after the quadratic moves: a body can be read either way,
-// with it or without. The larger of the two is said. Cost: `refits` times a second of one core for
+// with it or without; and, where the body has slid off its readings, how far they lie from it. The
+// larger of the two is said. Cost: `refits` times a second of one core for
 // 2,000 readings.
 #pragma once
 

@@ -21,7 +21,9 @@ constexpr double kCloseScore = 1.10, kQuarterTurn = 1.25;
 constexpr double kMirrorScore = 1.06;
 // Torsos without a waist, read all round, fit upside down 5 % better to 5 % worse: neither is told
 // then. Where half of the skin or more was not read they fit up to 14 % better.
+// Of another build, whose belly or back is what fits worst, the wrong side fits up to 13 % better.
 constexpr double kOppositeScore = 1.06, kOppositeScoreOfPart = 1.2, kWholeCoverage = 0.65;
+constexpr double kFrontScore = 1.2;
 // A pose that reaches less than this share of the readings that another reaches has slid off them,
 // where gaps cost no more than the missing counterparts and a hint is off.
 constexpr double kSlidOff = 0.5;
@@ -370,7 +372,8 @@ void check_front(const FitContext& s,
     const double here = best.score_mm;
     const std::string scores =
         text("it fits to %.2f mm turned front to back and to %.2f mm as it lies", score, here);
-    const Verdict verdict = verdict_of(best, score);
+    Verdict verdict = verdict_of(best, score);
+    if (verdict == Verdict::right && score < kFrontScore * here) verdict = Verdict::untold;
     if (given.hints.back && verdict == Verdict::wrong) {
         choice->front = "wrong: " + scores;
         choice->warnings.push_back(

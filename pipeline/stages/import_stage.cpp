@@ -240,12 +240,12 @@ Result<ImportedLabels> read_inputs(const Recipe& recipe,
 
 }  // namespace
 
-Result<Grid> mesh_inputs_grid(const Recipe& recipe) {
+Result<MeshExtent> mesh_inputs_extent(const Recipe& recipe) {
     const RecipeInputs& in = recipe.inputs;
     MeshOptions options = recipe.settings.of<MeshImportOptions>().mesh;
     options.scale = in.labels_scale;
     options.axes = axes_named(in.labels_axes);
-    return mesh_grid(recipe.resolve(in.labels), recipe.resolve(in.label_table), options);
+    return mesh_extent(recipe.resolve(in.labels), recipe.resolve(in.label_table), options);
 }
 
 Result<ImportedLabels> import_inputs(const Recipe& recipe,

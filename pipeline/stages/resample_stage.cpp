@@ -207,12 +207,15 @@ std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests&) {
 // the field's own plan says how much is held and measured (LabelField::need); then candidates are
 // listed beside them, and voxels sampled. Else by faces, of the map or of a torso: two threads
 // measure the distances to two unions of labels, each on its box, or on parts of it where it has
-// more than ten million nodes (label_field.cpp).
+// more than ten million nodes (label_field.cpp). Vessels and ducts of organ meshes cross more
+// blocks for a face than a torso's organs.
 double more_mb(const CaseSize& size, bool least) {
     constexpr double kLarge = 30;  // million nodes from which distances are 16-bit numbers
     constexpr double kHeld = 250, kMeasured = 415;  // for a million faces
     // Share of the faces that lie in two parts of boxes.
     constexpr double kWhole = 11.5, kInParts = 0.4;
+    // Of organ meshes, for a million faces: held, and the most while measured, whole and in parts.
+    constexpr double kMeshHeld = 300, kMeshMeasured = 590, kMeshInParts = 350;
     // Of thick slices, for a node of the box of the body: numbers of every node, not of those near
     // a surface alone.
     constexpr double kDense = 18, kDenseNodes = 7.5;
@@ -223,10 +226,16 @@ double more_mb(const CaseSize& size, bool least) {
         return std::min(1.0, size.surface_share()) * (505 + (least ? 8 : 12) * size.label_voxels) +
                3 * size.cooked_voxels;
     const double dense_mb = kDense * std::min(kDenseNodes, size.interpolated_nodes);
-    if (size.held_mb > 0)
-        return 2 * size.label_voxels + std::max(size.measured_mb + dense_mb,
-                                                (1 + kCandidates) * size.held_mb + kNode * nodes +
-                                                    kCooked * size.cooked_voxels);
+    const bool meshes = size.mesh_voxels > 0;
+    if (size.held_mb > 0 || meshes) {
+        const double held_mb = meshes ? kMeshHeld * size.surfaces : size.held_mb,
+                     most_mb = meshes
+                                   ? (nodes > kWhole ? kMeshInParts : kMeshMeasured) * size.surfaces
+                                   : size.measured_mb;
+        return 2 * size.label_voxels +
+               std::max(most_mb + dense_mb,
+                        (1 + kCandidates) * held_mb + kNode * nodes + kCooked * size.cooked_voxels);
+    }
     const double measured_mb =
         kMeasured * size.surfaces * (nodes > kWhole ? kInParts : 1) + dense_mb;
     return 2 * size.label_voxels + kHeld * size.surfaces +

@@ -161,6 +161,7 @@ struct CaseSize {
     double label_mb = 0;       // voxels of the label map in the file's own type
     double label_voxels = 0;   // millions
     double cooked_voxels = 0;  // millions, without those of a region
+    double cooked_mm = 1;      // edge of a cooked voxel
     // Millions of nodes between thick slices that are interpolated; 0: none are.
     double interpolated_nodes = 0;
     // Millions of faces between nodes of different labels; of a torso where nobody has counted.

@@ -82,13 +82,16 @@ int calibrate_camera(int argc, char** argv) {
     std::string video, output, camera, date;
     bool json = false;
     int max_views = 60;
-    app.add_option("--video", video, "AVI of JPEG pictures (MJPG), or a folder of .jpg files")
+    app.add_option("--video", video,
+                   "AVI of JPEG pictures (MJPG), such pictures one after another, or a folder of "
+                   ".jpg files")
         ->type_name("VIDEO")
         ->required();
     app.add_option("-o,--output", output, "Where to write the camera for the player")
         ->type_name("CAMERA.json");
-    app.add_option("--ruler", setup.markers.ruler_mm, "Length of the printed ruler, mm")
-        ->capture_default_str();
+    const CLI::Option* ruler =
+        app.add_option("--ruler", setup.markers.ruler_mm, "Length of the printed ruler, mm")
+            ->capture_default_str();
     app.add_option("--body", setup.markers.body_mm, "Size of the bodies as printed, mm")
         ->capture_default_str();
     app.add_option("--probe-reach", setup.markers.probe_reach_mm,
@@ -150,9 +153,20 @@ int calibrate_camera(int argc, char** argv) {
                        {"coverage", fit.coverage},
                        {"tilt_deg", fit.tilt_deg}};
     report.warnings.assign(fit.warnings.begin(), fit.warnings.end());
+    constexpr double kSlipMm = 0.5;  // of a hand that measures 100 mm
+    if (std::abs(setup.markers.ruler_mm - 100) > kSlipMm)
+        report.warnings.push_back(text_line(
+            "The sheets are printed at %.1f %% of their size, which is reckoned with: cut from "
+            "sheets that came out of the printer together, and keep to this file.",
+            setup.markers.ruler_mm));
     print_warnings("calibrate", report);
     if (auto s = write_report(common, report); !s) return fail("calibrate", s.error());
     if (!fit.problem.empty()) return fail("calibrate", {fit.problem, video, ""});
+    // No picture tells the scale of a print: all of it would lie farther away.
+    if (ruler->count() == 0)
+        std::fprintf(stderr,
+                     "sonocase calibrate: note: the printed ruler is taken to be 100 mm long: "
+                     "measure it, and say --ruler where it is not\n");
     if (!output.empty()) {
         setup.camera = c;
         setup.camera.camera = camera;
@@ -174,7 +188,9 @@ int calibrate_body(int argc, char** argv) {
     std::string video, camera, output, tool = "probe";
     bool json = false;
     int max_views = 90;
-    app.add_option("--video", video, "AVI of JPEG pictures (MJPG), or a folder of .jpg files")
+    app.add_option("--video", video,
+                   "AVI of JPEG pictures (MJPG), such pictures one after another, or a folder of "
+                   ".jpg files")
         ->type_name("VIDEO")
         ->required();
     app.add_option("--camera", camera, "The camera, as sonocase calibrate camera wrote it")
@@ -199,7 +215,7 @@ int calibrate_body(int argc, char** argv) {
     if (!setup) return fail("calibrate", setup.error());
     const std::vector<MarkerBody> bodies = marker_bodies(setup->markers);
     const MarkerBody& drawn = bodies[tool == "probe" ? 0 : 1];
-    const auto seen = look_at(video, drawn, 2, max_views);
+    auto seen = look_at(video, drawn, 2, max_views);
     if (!seen) return fail("calibrate", seen.error());
     BodyFit fit;
     if (seen->views.empty()) {
@@ -207,6 +223,8 @@ int calibrate_body(int argc, char** argv) {
     } else {
         const auto lens = at_size(setup->camera, seen->width_px, seen->height_px);
         if (!lens) return fail("calibrate", lens.error());
+        for (MarkerView& view : seen->views)
+            for (SeenTag& tag : view.tags) unbend_tag(*lens, tag);
         fit = fit_body(seen->views, drawn, *lens);
     }
     if (json) {

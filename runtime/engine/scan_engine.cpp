@@ -109,7 +109,20 @@ void ScanEngine::observe(const TrackerReading& given, bool is_device) {
 
 void ScanEngine::pass_over(std::span<const SessionSample> samples) {
     if (!procedure_.given()) return;
-    for (const SessionSample& sample : samples) procedure_.update(sample);
+    for (SessionSample sample : samples) {
+        if (!sample.has_press && sample.probe_ok) {
+            FrameInput input;
+            input.mannequin_from_probe = sample.mannequin_from_probe;
+            input.time_s = sample.time_s;
+            input.settings = last_.input.settings;
+            input.change = procedure_.scene();
+            renderer_.press_probe(input);
+            const PressReport& press = renderer_.press();
+            sample.has_press = press.solved;
+            sample.press = {press.force_n, press.pressure_kpa, press.vein_open};
+        }
+        procedure_.update(sample);
+    }
     if (reading_.device_time_s >= 0)
         procedure_shift_s_ = reading_.device_time_s - (reading_.time_s - origin_s_);
 }

@@ -114,9 +114,9 @@ class ScanEngine {
     // the others say, and both are with the reference; so is one at exactly the identity among
     // others, which senders give for none.
     void observe(const TrackerReading& reading, bool is_device);
-    // After a reading that restarts: takes the procedure through the samples that a recording holds
-    // before it, so that state, list and moments are those of playing it. Renders nothing. Cost:
-    // an update of the procedure for each.
+    // After a reading that restarts: takes the procedure through the samples that a recording or a
+    // script holds before it, so that state, list and moments are those of playing it. Renders
+    // nothing. Cost: an update of the procedure for each, and the press where they do not hold it.
     void pass_over(std::span<const SessionSample> samples);
     // An act of the exercise's procedure, for the next frame; at most four come into one frame, the
     // rest into those after it. False: dozens of them wait already.

@@ -217,7 +217,7 @@ std::span<const SessionSample> ReplayTracker::passed_over() const {
 TrackerHealth ReplayTracker::health() const {
     TrackerHealth health;
     health.phase = over_ ? TrackerPhase::ended : TrackerPhase::streaming;
-    health.device = "Replay of " + recording_.name;
+    health.device = Message("Replay of {}", {recording_.name});
     health.readings = sequence_;
     health.bad_frames = not_ok_;
     health.message = recording_.note;
@@ -363,7 +363,9 @@ bool PacedTracker::poll(double now_s, TrackerReading& reading) {
         }
         return started_;
     }
-    inner_s_ += (now_s - last_s_) * speed_ + jump_s_.exchange(0);
+    const double jump_s = jump_s_.exchange(0);
+    if (jump_s != 0) inner_->expect_jump();
+    inner_s_ += (now_s - last_s_) * speed_ + jump_s;
     last_s_ = now_s;
     const double duration = inner_->duration_s();
     // A jump back beyond the start goes on from the end, as in a loop.

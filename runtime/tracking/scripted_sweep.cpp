@@ -85,6 +85,44 @@ double ScriptedSweep::duration_s() const {
     return sweep_.keys.empty() ? 0 : sweep_.keys.back().time_s - sweep_.keys.front().time_s;
 }
 
+ScriptedSweep::ScriptedSweep(Sweep sweep, const Skin& skin, bool loop)
+    : sweep_(std::move(sweep)), skin_(skin), loop_(loop) {
+    if (std::none_of(sweep_.keys.begin(), sweep_.keys.end(),
+                     [](const SweepKey& key) { return key.acts.count > 0; }))
+        return;
+    const int count = static_cast<int>(duration_s() * kPassedRateHz) + 1;
+    for (int i = 0; i < count; ++i) {
+        SessionSample sample;
+        sample.time_s = i / kPassedRateHz;
+        const SweepPose pose =
+            sweep_pose(sweep_, sweep_.keys.front().time_s + sample.time_s, &skin_);
+        sample.probe_ok = true;
+        sample.mannequin_from_probe = pose.mannequin_from_probe;
+        sample.needle_ok = pose.has_needle;
+        sample.mannequin_from_needle = sample.mannequin_from_drawn = pose.mannequin_from_needle;
+        add_acts(sample.time_s, sample.acts);
+        samples_.push_back(sample);
+        acted_by_.push_back(acted_);
+    }
+    acted_ = 0;
+}
+
+void ScriptedSweep::add_acts(double t, ActList& acts) {
+    while (acted_ < sweep_.keys.size()) {
+        const SweepKey& key = sweep_.keys[acted_];
+        if (key.time_s - sweep_.keys.front().time_s > t) break;
+        // What does not fit comes with the next reading.
+        if (acts.count + key.acts.count > ActList::kMaxActs) break;
+        for (int i = 0; i < key.acts.count; ++i)
+            acts.add(key.acts.acts[static_cast<std::size_t>(i)]);
+        ++acted_;
+    }
+}
+
+std::span<const SessionSample> ScriptedSweep::passed_over() const {
+    return std::span(samples_).first(passed_);
+}
+
 bool ScriptedSweep::poll(double now_s, TrackerReading& reading) {
     if (sweep_.keys.empty()) return false;
     if (!started_) start_s_ = now_s, started_ = true;
@@ -103,26 +141,25 @@ bool ScriptedSweep::poll(double now_s, TrackerReading& reading) {
     if (pose.has_needle) {
         reading.sensors[kNeedleSensor] = {SensorState::ok, pose.mannequin_from_needle, 1.0f, 0};
     }
-    if (acted_ > 0 && t < sweep_.keys[acted_ - 1].time_s - sweep_.keys.front().time_s) {
-        acted_ = 0;
+    // Acts of the time that is left out would do something else without their poses: they come with
+    // the samples passed over.
+    passed_ = 0;
+    if (!samples_.empty() && (t < last_t_ || (jumps_ && t > last_t_))) {
         reading.restarts = true;
+        acted_ = 0;
+        while (passed_ < samples_.size() && samples_[passed_].time_s < t)
+            acted_ = acted_by_[passed_++];
     }
-    while (acted_ < sweep_.keys.size()) {
-        const SweepKey& key = sweep_.keys[acted_];
-        if (key.time_s - sweep_.keys.front().time_s > t) break;
-        // What does not fit comes with the next reading.
-        if (reading.acts.count + key.acts.count > ActList::kMaxActs) break;
-        for (int i = 0; i < key.acts.count; ++i)
-            reading.acts.add(key.acts.acts[static_cast<std::size_t>(i)]);
-        ++acted_;
-    }
+    jumps_ = false;
+    last_t_ = t;
+    add_acts(t, reading.acts);
     return true;
 }
 
 TrackerHealth ScriptedSweep::health() const {
     TrackerHealth health;
     health.phase = over_ ? TrackerPhase::ended : TrackerPhase::streaming;
-    health.device = "Scripted sweep " + sweep_.name;
+    health.device = Message("Script {}", {sweep_.name});
     health.readings = sequence_;
     return health;
 }

@@ -29,13 +29,19 @@ Rigid frame_along(Point3 origin, Vector3 z, Vector3 x_hint);
 class ScriptedSweep final : public Tracker {
   public:
     // loop: starts over when it ends. The bundle behind the skin must outlive the tracker.
-    ScriptedSweep(Sweep sweep, const Skin& skin, bool loop)
-        : sweep_(std::move(sweep)), skin_(skin), loop_(loop) {}
+    ScriptedSweep(Sweep sweep, const Skin& skin, bool loop);
     bool poll(double now_s, TrackerReading& reading) override;
     TrackerHealth health() const override;
     double duration_s() const override;
+    // What a jump has left out, at kPassedRateHz; nothing where the script has no acts.
+    std::span<const SessionSample> passed_over() const override;
+    void expect_jump() override { jumps_ = true; }
 
   private:
+    static constexpr double kPassedRateHz = 25;
+    // Adds the acts of keys up to t, as many as fit.
+    void add_acts(double t, ActList& acts);
+
     Sweep sweep_;
     Skin skin_;
     bool loop_;
@@ -44,6 +50,11 @@ class ScriptedSweep final : public Tracker {
     bool over_ = false;
     std::uint64_t sequence_ = 0;
     std::size_t acted_ = 0;  // keys whose acts have been performed
+    double last_t_ = 0;
+    bool jumps_ = false;
+    std::vector<SessionSample> samples_;  // of the whole script, with its acts
+    std::vector<std::size_t> acted_by_;   // # samples: keys whose acts they and those before have
+    std::size_t passed_ = 0;
 };
 
 }  // namespace sonocase::runtime::inline tracking

@@ -31,7 +31,7 @@ enum class TrackerPhase : std::uint8_t {
 
 struct TrackerHealth {
     TrackerPhase phase = TrackerPhase::searching;
-    std::string device;  // "Polhemus Viper", with its serial where it has one
+    Message device;      // "Polhemus Viper", with its serial where it has one
     Message message;     // a whole sentence for the user; empty when all is well
     double rate_hz = 0;  // measured
     // From what the device measures to the reading, over which poses are predicted; negative: not
@@ -69,6 +69,8 @@ class Tracker {
     // Where the last reading `restarts`: what a recording with acts holds before it, from its
     // beginning, so that a jump leads to the same state as playing. Valid until the next poll.
     virtual std::span<const SessionSample> passed_over() const { return {}; }
+    // The next poll need not go on from the last: somebody has moved the time line.
+    virtual void expect_jump() {}
     // True for hardware and networks. Their readings are noisy, so that a pose that stays equal to
     // the last bit means a frozen sensor.
     virtual bool is_device() const { return false; }

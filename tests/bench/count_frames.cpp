@@ -25,6 +25,7 @@
 #include "runtime/engine/skin.h"
 #include "runtime/imaging/doppler/doppler_view.h"
 #include "runtime/imaging/renderer.h"
+#include "runtime/imaging/truth/frame_truth.h"
 #include "runtime/player/headless/run_headless.h"
 #include "runtime/player/session/effect_trials.h"
 #include "runtime/tracking/scripted_sweep.h"
@@ -112,6 +113,22 @@ class Frames {
                                              std::cbrt(pool_ml * 1e3 * 3 / (4 * kPi)), false};
                 }
                 renderer.render(input, pixels_);
+            }
+        };
+        all();
+        counted(name, poses_.size(), all);
+    }
+    // What labels, needle, shadows and depths of a frame add to it.
+    void truth(const std::string& name) {
+        const RenderOptions o = options(ImageModel::physical, "auto", "modern");
+        auto truth = TruthRenderer::create(bundle_, exercise_, o);
+        must(static_cast<bool>(truth), "no truth");
+        std::vector<std::uint8_t> labels(pixels_.size()), needle = labels, shadowed = labels;
+        std::vector<float> depth(pixels_.size());
+        const auto all = [&] {
+            for (FrameInput input : poses_) {
+                input.time_s = 1.3;  // in the middle of a breath
+                truth->render(input, {labels, needle, shadowed, depth});
             }
         };
         all();
@@ -217,6 +234,7 @@ void count_all(const std::string& path) {
     f.frames("physical/modern/pool_2_ml", acts(f.exercise()), plain, 0, 2);
     f.frames("physical/modern-linear/procedure", acts(linear), flat);
     f.frames("physical/modern-linear/pool_2_ml", acts(linear), flat, 0, 2);
+    f.truth("truth");
     f.colour("physical/colour");
     f.start("first_frame/paper", f.options(paper, "auto"));
     f.start("first_frame/physical", f.options(physical, "auto"));

@@ -20,4 +20,13 @@ inline double measure(const pipeline::RegisterResult& r, const std::string& name
     return -1;
 }
 
+// A note of it.
+inline std::string note(const pipeline::RegisterResult& r, const std::string& name) {
+    for (const Note& n : r.report.notes) {
+        if (n.name == name) return n.text;
+    }
+    ADD_FAILURE() << name;
+    return "";
+}
+
 }  // namespace sonocase::testing

@@ -65,6 +65,10 @@ class MarkerVideo {
         }
     }
 
+    // What lies still from now on is drawn once and for all, as is its defocus.
+    void keep(const PlacedBody& still, const VideoOptions& options = {}) {
+        paint(still, 0, options, ground_);
+    }
     // The picture whose exposure is centred on time_s in its middle row.
     std::vector<std::uint8_t> take(const std::vector<PlacedBody>& bodies,
                                    double time_s,

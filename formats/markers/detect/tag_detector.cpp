@@ -266,7 +266,10 @@ void PictureFollower::look_at_board(const GreyPicture& picture) {
         }
         if (tried >= kTried || fitted_.size() >= kEnough) continue;
         ++tried;
-        if (fit_tag(picture, tag, kFewPixels)) fitted_.push_back(tag);
+        if (fit_tag(picture, tag, kFewPixels)) {
+            unbend_tag(follower_.camera(), tag);
+            fitted_.push_back(tag);
+        }
     }
     // Otherwise the camera or the board has moved, or most of it is hidden.
     constexpr std::size_t kHeld = 4;
@@ -334,10 +337,12 @@ void PictureFollower::note_twice() {
 
 FollowerPicture PictureFollower::follow(const GreyPicture& picture, double time_s) {
     constexpr MarkerRole kTools[] = {MarkerRole::probe, MarkerRole::needle};
-    constexpr int kSearchEvery = 4;   // pictures, while everything is in view
-    constexpr int kEnoughTags = 2;    // of a body
-    constexpr int kOverlap = 40;      // pixels: by which parts overlap
-    constexpr double kPauseS = 0.15;  // where a tool is by then is not known
+    constexpr int kSearchEvery = 4;                   // pictures, while everything is in view
+    constexpr int kEnoughTags = 2;                    // of a body
+    constexpr int kOverlap = 40;                      // pixels: by which parts overlap
+    constexpr int kFineParts = 6, kFineOverlap = 20;  // large tags are found at large steps
+    constexpr int kLongMissing = 30;                  // pictures
+    constexpr double kPauseS = 0.15;                  // where a tool is by then is not known
     ++picture_;
     const bool begins = time_s - last_s_ > kPauseS;
     last_s_ = time_s;
@@ -353,21 +358,32 @@ FollowerPicture PictureFollower::follow(const GreyPicture& picture, double time_
         missed[t] = !seen(kTools[t], kEnoughTags);
         missing = missing || missed[t];
     }
+    bool lately = !missing || begins;  // something that was in view a second ago is missing
+    for (int t = 0; t < 2; ++t) {
+        missed_for_[t] = missed[t] ? missed_for_[t] + 1 : 0;
+        lately = lately || (missed[t] && missed_for_[t] < kLongMissing);
+    }
     if (begins) {
         detector_.read(picture, whole(picture), kFindStep, raw_);
         foreign_ = {};
         for (const SeenTag& tag : raw_)
             foreign_[0] += find_tag(follower_.bodies(), tag.id).body < 0;
     } else if (missing || picture_ % kSearchEvery == 0) {
-        part_ = (part_ + 1) % kParts;
-        const PictureRegion part{0, picture.height_px * part_ / kParts - kOverlap, picture.width_px,
-                                 picture.height_px * (part_ + 1) / kParts + kOverlap};
+        // A third at large steps. What has been missing for long may be too far away for these:
+        // then sixths at small steps follow.
+        const int round = lately ? 0 : static_cast<int>(picture_ % (kParts + kFineParts));
+        const bool fine = round >= kParts;
+        if (!fine) part_ = (part_ + 1) % kParts;
+        const int index = fine ? round - kParts : part_, parts = fine ? kFineParts : kParts;
+        const int overlap = fine ? kFineOverlap : kOverlap;
+        const PictureRegion part{0, picture.height_px * index / parts - overlap, picture.width_px,
+                                 picture.height_px * (index + 1) / parts + overlap};
         const std::size_t before = raw_.size();
-        detector_.read(picture, part, kSearchStep, raw_);
+        detector_.read(picture, part, fine ? kFindStep : kSearchStep, raw_);
         int foreign = 0;
         for (std::size_t k = before; k < raw_.size(); ++k)
             foreign += find_tag(follower_.bodies(), raw_[k].id).body < 0;
-        foreign_[part_] = foreign;
+        if (!fine) foreign_[part_] = foreign;
         // The first tag of a body shows where to look more closely.
         for (int t = 0; t < 2; ++t) {
             if (!missed[t]) continue;
@@ -400,6 +416,7 @@ FollowerPicture PictureFollower::follow(const GreyPicture& picture, double time_
         const int id = follower_.body(MarkerRole::board)->tags[index].id;
         for (SeenTag& tag : raw_)
             if (tag.id == id && tag.contrast == 0 && fit_tag(picture, tag, 250)) {
+                unbend_tag(follower_.camera(), tag);
                 fitted_.push_back(tag);
                 ++board_tags;
             }
@@ -408,7 +425,9 @@ FollowerPicture PictureFollower::follow(const GreyPicture& picture, double time_
         const TagPlace place = find_tag(follower_.bodies(), tag.id);
         if (place.body < 0 || follower_.bodies()[place.body].role == MarkerRole::board) continue;
         if (std::binary_search(twice_.begin(), twice_.end(), tag.id)) continue;
-        if (fit_tag(picture, tag)) fitted_.push_back(tag);
+        if (!fit_tag(picture, tag)) continue;
+        unbend_tag(follower_.camera(), tag);
+        fitted_.push_back(tag);
     }
     return follower_.follow(fitted_, twice_, std::accumulate(foreign_.begin(), foreign_.end(), 0),
                             time_s);

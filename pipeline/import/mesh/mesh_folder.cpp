@@ -178,6 +178,19 @@ Result<Grid> grid_of(const std::vector<Organ>& organs,
     return grid;
 }
 
+// A triangle shows its area as seen along each axis in faces of voxels.
+double faces_of(const Surface& surface, const MeshOptions& options) {
+    double seen_mm2 = 0;
+    for (const auto& t : surface.triangles) {
+        const Point3 a = surface.points[t[0]], b = surface.points[t[1]], c = surface.points[t[2]];
+        const double z = (a.z + b.z + c.z) / 3;
+        if (z < options.low_mm || z > options.high_mm) continue;
+        const Vector3 area = 0.5 * cross(b - a, c - a);
+        seen_mm2 += std::abs(area.x) + std::abs(area.y) + std::abs(area.z);
+    }
+    return seen_mm2 / (options.voxel_mm * options.voxel_mm);
+}
+
 struct Totals {
     int caps = 0, open_loops = 0, turned = 0;
     double longest_cap_mm = 0;
@@ -241,13 +254,18 @@ Result<NodeTable> table_of(const std::string& path, const std::string& table_pat
 
 }  // namespace
 
-Result<Grid> mesh_grid(const std::string& path,
-                       const std::string& table_path,
-                       const MeshOptions& options) {
+Result<MeshExtent> mesh_extent(const std::string& path,
+                               const std::string& table_path,
+                               const MeshOptions& options) {
     SONOCASE_TRY(const auto table, table_of(path, table_path));
     Collector collector(table, options);
     for (const std::string& file : mesh_files(path)) SONOCASE_TRY_DONE(collector.add_file(file));
-    return grid_of(collector.organs(), options, path);
+    MeshExtent extent;
+    SONOCASE_TRY(extent.grid, grid_of(collector.organs(), options, path));
+    for (const Organ& organ : collector.organs())
+        (organ.row.role == NodeRole::body ? extent.body_faces : extent.organ_faces) +=
+            faces_of(organ.patches, options);
+    return extent;
 }
 
 Result<MeshBody> read_meshes(const std::string& path,

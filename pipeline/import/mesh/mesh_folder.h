@@ -44,10 +44,18 @@ struct MeshBody {
 
 bool is_mesh_source(const std::string& path);  // a mesh file, or a folder with one
 
-// The grid of read_meshes alone, before anything is mended or filled. Errors: those of reading.
-Result<Grid> mesh_grid(const std::string& path,
-                       const std::string& table_path,
-                       const MeshOptions& options);
+// What is known of read_meshes before anything is mended or filled.
+struct MeshExtent {
+    Grid grid;
+    // Faces of voxels at the organs' triangles between the heights that are kept, caps left out,
+    // and at those of the body.
+    double organ_faces = 0, body_faces = 0;
+};
+
+// Errors: those of reading.
+Result<MeshExtent> mesh_extent(const std::string& path,
+                               const std::string& table_path,
+                               const MeshOptions& options);
 
 // GLB is in metres, y to the head, z to the front, x to the patient's left; everything else is in
 // mm, RAS+ or LPS+ as its header says, RAS+ if none says anything; the report's note "axes" says

@@ -249,7 +249,8 @@ std::uint32_t sample_block_as(const PaperBlock& b) {
         for (; b.press != nullptr && k < std::min(b.press->active, b.samples);
              k += press::kPressRows) {
             const int rows = std::min(press::kPressRows, b.samples - k);
-            if (b.press->moves(b.first_line, k, rows)) {
+            chunk.movers = b.press->movers(b.first_line, k, rows);
+            if (chunk.movers.any()) {
                 press::HWY_NAMESPACE::press_chunk(df, *b.press, b.first_line, v, k, rows, chunk);
                 met = hn::Or(met, pressed_rows<kTexture>(d, b, look, chunk, v, k, k + rows));
             } else {

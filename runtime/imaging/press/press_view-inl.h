@@ -268,49 +268,63 @@ inline bool may_close(const PressView& v, int k) {
 }
 
 // Adds to a stretch the shift by pools, whose surfaces it does not meet: it bends so little that it
-// is worked out for every `every`-th sample and is linear in between (PressView::pool_step).
+// is worked out for every `every`-th sample and is linear in between (PressMovers). still: nothing
+// else moves the stretch, whose rows are not filled in yet.
 template <class D>
-HWY_NOINLINE void push_gently(
-    D d, const PressView& v, int line, int beam, int first, int rows, int every, PressChunk& out) {
+HWY_NOINLINE void push_gently(D d,
+                              const PressView& v,
+                              int line,
+                              int beam,
+                              int first,
+                              int rows,
+                              int every,
+                              bool still,
+                              PressChunk& out) {
+    const auto base = [&](const float* from)
+                          HWY_ATTR { return still ? hn::Zero(d) : hn::Load(d, from); };
     const auto shift_at = [&](int row) HWY_ATTR {
         const int at = std::min(row, rows - 1);
-        const ShiftLanes<D> base{hn::Load(d, out.along + (at + 1) * kPressBeams + beam),
-                                 hn::Load(d, out.side + std::max(at, 0) * kPressBeams + beam)};
-        ShiftLanes<D> shift = base;
+        const ShiftLanes<D> before{base(out.along + (at + 1) * kPressBeams + beam),
+                                   base(out.side + std::max(at, 0) * kPressBeams + beam)};
+        ShiftLanes<D> shift = before;
         pool_lanes(d, v, places_of_beams(d, v, line, first + row), shift);
-        return ShiftLanes<D>{hn::Sub(shift.along, base.along), hn::Sub(shift.side, base.side)};
+        return ShiftLanes<D>{hn::Sub(shift.along, before.along), hn::Sub(shift.side, before.side)};
     };
+    const auto part = hn::Set(d, 1 / static_cast<float>(every));
     ShiftLanes<D> above = shift_at(-1);
     for (int knot = -1; knot < rows; knot += every) {
         const ShiftLanes<D> below = shift_at(knot + every);
-        for (int step = 0; step < every && knot + step < rows; ++step) {
-            const int row = knot + step;
-            const auto part = hn::Set(d, static_cast<float>(step) / static_cast<float>(every));
-            const auto between = [&](auto a, auto b)
-                                     HWY_ATTR { return hn::Add(a, hn::Mul(part, hn::Sub(b, a))); };
-            float* along = out.along + (row + 1) * kPressBeams + beam;
-            hn::Store(hn::Add(hn::Load(d, along), between(above.along, below.along)), d, along);
-            if (row < 0) continue;
-            float* side = out.side + row * kPressBeams + beam;
-            hn::Store(hn::Add(hn::Load(d, side), between(above.side, below.side)), d, side);
+        const auto along_more = hn::Mul(hn::Sub(below.along, above.along), part),
+                   side_more = hn::Mul(hn::Sub(below.side, above.side), part);
+        auto along = above.along, side = above.side;
+        for (int row = knot; row < std::min(knot + every, rows); ++row) {
+            float* to = out.along + (row + 1) * kPressBeams + beam;
+            hn::Store(hn::Add(base(to), along), d, to);
+            if (row >= 0) {
+                to = out.side + row * kPressBeams + beam;
+                hn::Store(hn::Add(base(to), side), d, to);
+            }
+            along = hn::Add(along, along_more);
+            side = hn::Add(side, side_more);
         }
         above = below;
     }
 }
 
 // Fills the lanes of one vector of beams. first_beam: first beam of the block; beam: the vector's
-// first within it; [first, first + rows): samples, all active.
+// first within it; [first, first + rows): samples, all active; out.movers: what moves them.
 template <class D>
 HWY_NOINLINE void press_chunk(
     D d, const PressView& v, int first_beam, int beam, int first, int rows, PressChunk& out) {
     const hn::RebindToSigned<D> di;
     const int line = first_beam + beam;
     const BetweenNodes<D> between(d, v, line);
-    const bool dents = v.dents(first_beam, first, rows);
-    const int every = v.pool_step(first_beam, first, rows);
+    const bool dents = out.movers.needle;
+    const int every = out.movers.pool_step;
     const bool gently = every > 1 && !dents, pushes = every > 0 && !gently;
+    const bool still = gently && (!v.pressed || first > v.capacity);
     out.first = first;
-    for (int row = -1; row < rows; ++row) {
+    for (int row = still ? rows : -1; row < rows; ++row) {
         const int k = std::max(first + row, 0);
         const std::ptrdiff_t nodes = static_cast<std::ptrdiff_t>(k) * v.node_stride;
         auto along = hn::Zero(d), side = hn::Zero(d);
@@ -331,7 +345,7 @@ HWY_NOINLINE void press_chunk(
         hn::Store(along, d, out.along + (row + 1) * kPressBeams + beam);
         if (row >= 0) hn::Store(side, d, out.side + row * kPressBeams + beam);
     }
-    if (gently) push_gently(d, v, line, beam, first, rows, every, out);
+    if (gently) push_gently(d, v, line, beam, first, rows, every, still, out);
     out.any_closed = false;
     if (!v.pressed || !v.field->closed_nodes().any) return;
     for (int row = 0; row < rows; ++row) {

@@ -203,46 +203,48 @@ PressView::Shift PressView::at(int line, int k) const {
     return exact(s);
 }
 
-double PressView::circle_around(int line, int first, int rows, Point3& middle) const {
+PressMovers PressView::movers(int line, int first, int rows) const {
+    PressMovers m;
+    if (first >= active) return m;
+    m.probe = pressed;
+    const NeedleDent& needle = field->needle();
+    if (!needle.moves() && field->pools().empty()) return m;
+    // A circle, in the plane, around the stretch.
     const auto corner = [&](int l, int k) {
-        const int at = std::min(l, lines - 1);
-        const double r = (k + 0.5) * static_cast<double>(step_mm);
-        const auto number = [&](int row) { return static_cast<double>(beam_row(row)[at]); };
+        const auto at = static_cast<std::size_t>(std::min(l, lines - 1));
+        const double r = (k + 0.5) * double{step_mm};
+        const auto number = [&](int row) { return double{beam_row(row)[at]}; };
         return Point3{number(0) + r * number(2), 0, number(1) + r * number(3)};
     };
-    middle = corner(line + kPressBeams / 2, first + rows / 2);
-    double reach = 0;
-    for (const int l : {line, line + kPressBeams - 1})
-        for (const int k : {first, first + rows - 1})
-            reach = std::max(reach, norm(corner(l, k) - middle));
-    return reach;
+    const Point3 middle = corner(line + kPressBeams / 2, first + rows / 2);
+    double reach2 = 0;
+    for (const int l : {line, line + kPressBeams - 1}) {
+        for (const int k : {first, first + rows - 1}) {
+            const Vector3 away = corner(l, k) - middle;
+            reach2 = std::max(reach2, dot(away, away));
+        }
+    }
+    const double reach_mm = std::sqrt(reach2);
+    m.needle = needle.moves() && norm(needle.tip - middle) < reach_mm + kDentReachMm;
+    m.pool_step = pool_step(middle, reach_mm);
+    return m;
 }
 
-bool PressView::dents(int line, int first, int rows) const {
-    const NeedleDent& needle = field->needle();
-    if (!needle.moves()) return false;
-    Point3 middle;
-    const double reach = circle_around(line, first, rows, middle);
-    return norm(needle.tip - middle) < reach + kDentReachMm;
-}
-
-int PressView::pool_step(int line, int first, int rows) const {
-    if (field->pools().empty()) return 0;
-    Point3 middle;
-    const double reach = circle_around(line, first, rows, middle), mm = double{step_mm};
+int PressView::pool_step(Point3 middle, double reach_mm) const {
+    const double mm = double{step_mm};
     // The place that a pool moves has been moved by probe, needle and the pools before.
     const double moved = field->farthest_mm();
     bool any = false;
-    int step = 8;
+    int step = kPressRows;
     for (const SceneChange::Pool& pool : field->pools()) {
         const double radius = pool.radius_mm, away = norm(pool.centre - middle);
-        if (away >= reach + moved + kPoolReaches * radius) continue;
+        if (away >= reach_mm + moved + kPoolReaches * radius) continue;
         any = true;
         // Within the pool the shift is linear. Outside it is (1 - k^3) R^3 / 3 r^2, whose second
         // derivative d leaves a line over h by d h^2 / 8.
         const double by_others = moved - (1 - kPoolCore) * radius;
-        for (; step > 1; step = step == 8 ? 4 : 1) {
-            const double h = step * mm, near = reach + h + by_others;
+        for (; step > 1; step = step > 4 ? step / 2 : 1) {
+            const double h = step * mm, near = reach_mm + h + by_others;
             const double from = std::max(
                 radius, std::sqrt(std::sqrt(h * h * radius * radius * radius / (4 * kPoolOffMm))));
             if (away + near <= radius || away - near >= from) break;

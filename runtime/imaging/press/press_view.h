@@ -20,8 +20,19 @@ inline constexpr int kPressBeams = 16;     // beams of a block
 inline constexpr int kPressRows = 32;      // rows of a stretch
 inline constexpr float kStillMm = 0.002f;  // a smaller shift is drawn as none
 
-// Filled by press_chunk() (press_view-inl.h): rows of kPressBeams numbers for samples from `first`.
+// What moves a stretch.
+struct PressMovers {
+    bool probe = false, needle = false;
+    // Over how many samples (1, 4, 8, 16 or 32) the shift by pools is linear to within
+    // PressView::kPoolOffMm; 0: no pool moves them.
+    int pool_step = 0;
+    bool any() const { return probe || needle || pool_step > 0; }
+};
+
+// Filled by press_chunk() (press_view-inl.h) but for `movers`, which it reads: rows of kPressBeams
+// numbers for samples from `first`.
 struct PressChunk {
+    PressMovers movers;
     int first = 0;
     bool any_closed = false;  // if not, `closed` is not filled in
     // mm, see PlaneShift; the first row is the sample's before `first`, or its own where first is 0
@@ -41,17 +52,10 @@ class PressView {
     // nothing where the field has not changed.
     void show(SimdTarget simd, const PressField& field);
 
-    // False where nothing moves in the samples [first, first + rows) of the beams [line, line +
-    // kPressBeams).
-    bool moves(int line, int first, int rows) const {
-        return first < active &&
-               (pressed || dents(line, first, rows) || pool_step(line, first, rows) > 0);
-    }
-    bool dents(int line, int first, int rows) const;  // a needle does
-    // Over how many samples (1, 4 or 8) the shift by pools is linear to within kPoolOffMm; 0: no
-    // pool moves them.
+    // What moves the samples [first, first + rows) of the beams [line, line + kPressBeams). Cost:
+    // 0.1 us with a needle or a pool.
+    PressMovers movers(int line, int first, int rows) const;
     static constexpr double kPoolOffMm = 0.02;
-    int pool_step(int line, int first, int rows) const;
 
     // The shift of one sample, k < active; line <= lines. by_probe: the probe's shift alone.
     struct Shift {
@@ -98,8 +102,7 @@ class PressView {
 
   private:
     void cross_columns();
-    // The middle and radius of a circle, in the plane, around a stretch.
-    double circle_around(int line, int first, int rows, Point3& middle) const;
+    int pool_step(Point3 middle, double reach_mm) const;
 
     const PressField* shown_ = nullptr;
     std::uint32_t version_ = 0;

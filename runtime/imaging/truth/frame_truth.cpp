@@ -37,8 +37,12 @@ struct TruthRenderer::Impl {
     void ensure_loaded(const Rigid& pose);
     void lay_out_rows(const Rigid& pose);
     void planes_of(const FrameInput& input, const TruthPlanes& planes);
+    void labels(const TruthPlanes& planes);
     void shadows(const TruthPlanes& planes);
-    void count_shadowed(const TruthPlanes& planes);
+    void count_shadowed(const std::uint8_t* shadowed,
+                        const std::uint8_t* labels,
+                        std::size_t count);
+    void depths(const TruthPlanes& planes, const TruthRun& run, std::size_t at);
     void facts(const FrameInput& input);
     void needle_facts(const FrameInput& input);
     void target_facts();
@@ -51,6 +55,7 @@ struct TruthRenderer::Impl {
     ScanGeometry geometry;
     TruthPixels pixels;
     PlaneLookUp look_up;
+    PlainTiles tiles;
     CaseAnatomy anatomy;
     NeedleSight sight;
     NeedleModel needle;
@@ -98,6 +103,7 @@ TruthRenderer::Impl::Impl(CaseView view,
       pixels(geometry),
       look_up(
           view, exercise, moves.contact, moves.breathing, moves.pulsation, geometry, pixels.rays()),
+      tiles(geometry, pixels, look_up.contact_reach_mm()),
       anatomy(view, moves.breathing ? e.breathing : BreathingMotion{}),
       sight(&anatomy, e),
       needle(e.needle),
@@ -187,6 +193,7 @@ void TruthRenderer::Impl::lay_out_rows(const Rigid& pose) {
     f.origin_y_px = static_cast<float>(geometry.origin_y_px);
     f.press = pressed != nullptr ? press_view.get() : nullptr;
     f.closed_label = closed_label.data();
+    f.rays = pixels.rays();
     f.lines_per_ray = static_cast<float>(geometry.scanlines) / static_cast<float>(pixels.rays());
     const BreathingLattice* lattice = look_up.breathing();
     f.weight = lattice != nullptr ? lattice->weight.data() : nullptr;
@@ -196,6 +203,32 @@ void TruthRenderer::Impl::lay_out_rows(const Rigid& pose) {
         f.first_vx[a] = lattice->first_vx[a];
     }
     f.per_voxel = lattice->per_voxel;
+}
+
+void TruthRenderer::Impl::labels(const TruthPlanes& planes) {
+    std::span<float> dark;
+    if (!planes.shadowed.empty()) dark = first_hard_mm;
+    std::fill(dark.begin(), dark.end(), kNoHardMm);
+    tiles.find(simd, rows, dark.empty());
+    pixels.for_each_run([&](const TruthRun& run, std::size_t at) {
+        std::uint8_t* to = planes.labels.data() + at;
+        for (int n = 0; n < run.count;) {
+            const int label = tiles.label(run.begin + n, run.row);
+            int end = n;
+            do end += PlainTiles::kColumns - (run.begin + end) % PlainTiles::kColumns;
+            while (end < run.count && tiles.label(run.begin + end, run.row) == label);
+            end = std::min(end, run.count);
+            if (label < 0) {
+                truth_labels(simd, rows, run, n, end, to, truth.pixels_of_label.data(), dark,
+                             pixels.rays_per_px_at_face());
+            } else {
+                std::fill(to + n, to + end, static_cast<std::uint8_t>(label));
+                truth.pixels_of_label[label] += static_cast<std::uint32_t>(end - n);
+            }
+            n = end;
+        }
+        depths(planes, run, at);  // while its rays and depths are at hand
+    });
 }
 
 void TruthRenderer::Impl::shadows(const TruthPlanes& planes) {
@@ -216,26 +249,36 @@ void TruthRenderer::Impl::shadows(const TruthPlanes& planes) {
         const auto skip = low - run.ray;
         const TruthRun dark{run.row, run.begin + static_cast<int>(skip),
                             static_cast<int>(high - low), low, run.r_mm + skip};
-        truth_shadows(simd, dark, first_hard_mm.data(), planes.shadowed.data() + at + skip);
+        const std::size_t from = at + static_cast<std::size_t>(skip);
+        truth_shadows(simd, dark, first_hard_mm, planes.shadowed.data() + from);
+        count_shadowed(planes.shadowed.data() + from, planes.labels.data() + from,
+                       static_cast<std::size_t>(dark.count));
     });
-    if (!planes.labels.empty()) count_shadowed(planes);
 }
 
-void TruthRenderer::Impl::count_shadowed(const TruthPlanes& planes) {
+void TruthRenderer::Impl::count_shadowed(const std::uint8_t* shadowed,
+                                         const std::uint8_t* labels,
+                                         std::size_t count) {
     constexpr std::uint64_t kEach = 0x0101010101010101u;
-    for (std::size_t n = 0; n < planes.shadowed.size(); n += 8) {
-        std::uint64_t dark = 0, labels = 0;
-        const std::size_t left = std::min<std::size_t>(8, planes.shadowed.size() - n);
-        std::memcpy(&dark, planes.shadowed.data() + n, left);
+    for (std::size_t n = 0; n < count; n += 8) {
+        std::uint64_t dark = 0, shown = 0;
+        const std::size_t left = std::min<std::size_t>(8, count - n);
+        std::memcpy(&dark, shadowed + n, left);
         if (dark == 0) continue;
-        std::memcpy(&labels, planes.labels.data() + n, left);
-        if (dark == kEach && labels == kEach * planes.labels[n]) {  // true nearly everywhere
-            truth.shadowed_pixels_of_label[planes.labels[n]] += 8;
+        std::memcpy(&shown, labels + n, left);
+        if (dark == kEach && shown == kEach * labels[n]) {  // true nearly everywhere
+            truth.shadowed_pixels_of_label[labels[n]] += 8;
             continue;
         }
         for (std::size_t i = n; i < n + left; ++i)
-            truth.shadowed_pixels_of_label[planes.labels[i]] += planes.shadowed[i];
+            truth.shadowed_pixels_of_label[labels[i]] += shadowed[i];
     }
+}
+
+void TruthRenderer::Impl::depths(const TruthPlanes& planes, const TruthRun& run, std::size_t at) {
+    if (planes.skin_depth_mm.empty()) return;
+    truth_depths(simd, rows, run, look_up.contact().entry_mm.data(),
+                 planes.skin_depth_mm.data() + at);
 }
 
 void TruthRenderer::Impl::planes_of(const FrameInput& input, const TruthPlanes& planes) {
@@ -245,30 +288,26 @@ void TruthRenderer::Impl::planes_of(const FrameInput& input, const TruthPlanes& 
     assert(planes.shadowed.empty() || planes.shadowed.size() == area);
     assert(planes.skin_depth_mm.empty() || planes.skin_depth_mm.size() == area);
     (void)area;
-    if (!planes.labels.empty()) {
+    if (!planes.skin_depth_mm.empty())
+        pixels.set_outside(planes.skin_depth_mm, std::numeric_limits<float>::quiet_NaN());
+    if (planes.labels.empty()) {
+        if (!planes.skin_depth_mm.empty())
+            pixels.for_each_run(
+                [&](const TruthRun& run, std::size_t at) { depths(planes, run, at); });
+    } else {
         ensure_loaded(input.mannequin_from_probe);
         pixels.set_outside(planes.labels, std::uint8_t{0});
-        std::span<float> dark;
-        if (!planes.shadowed.empty()) dark = first_hard_mm;
-        std::fill(dark.begin(), dark.end(), kNoHardMm);
-        const bool near = near_enough(bundle->grid, input.mannequin_from_probe, geometry);
-        pixels.for_each_run([&](const TruthRun& run, std::size_t at) {
-            if (!near) {
+        if (near_enough(bundle->grid, input.mannequin_from_probe, geometry)) {
+            labels(planes);
+        } else {
+            std::fill(first_hard_mm.begin(), first_hard_mm.end(), kNoHardMm);
+            pixels.for_each_run([&](const TruthRun& run, std::size_t at) {
                 truth.pixels_of_label[0] += static_cast<std::uint32_t>(run.count);
                 std::fill_n(planes.labels.data() + at, run.count, std::uint8_t{0});
-                return;
-            }
-            truth_labels(simd, rows, run, planes.labels.data() + at, truth.pixels_of_label.data(),
-                         dark, pixels.rays_per_px_at_face());
-        });
+                depths(planes, run, at);
+            });
+        }
         if (!planes.shadowed.empty()) shadows(planes);
-    }
-    if (!planes.skin_depth_mm.empty()) {
-        pixels.set_outside(planes.skin_depth_mm, std::numeric_limits<float>::quiet_NaN());
-        pixels.for_each_run([&](const TruthRun& run, std::size_t at) {
-            truth_depths(simd, rows, run, look_up.contact().entry_mm.data(),
-                         planes.skin_depth_mm.data() + at);
-        });
     }
     if (!planes.needle.empty()) {
         std::fill(planes.needle.begin(), planes.needle.end(), std::uint8_t{0});

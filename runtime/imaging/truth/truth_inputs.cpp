@@ -10,6 +10,7 @@
 #include "formats/volume/brick_volume.h"
 #include "formats/volume/tissue.h"
 #include "runtime/imaging/physical/model/region_look_up.h"
+#include "runtime/imaging/press/press_view.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -133,6 +134,178 @@ bool TruthPixels::scanned(int column, int row) const {
         return r.row < row || (r.row == row && r.end <= column);
     });
     return after != runs_.end() && after->row == row && after->begin <= column;
+}
+
+PlainTiles::PlainTiles(const ScanGeometry& g, const TruthPixels& pixels, double reach_mm)
+    : geometry_(g), across_((g.width_px + kColumns - 1) / kColumns) {
+    const int down = (g.height_px + kRows - 1) / kRows;
+    tiles_.resize(static_cast<std::size_t>(across_) * down);
+    label_.assign(tiles_.size(), -1);
+    pixels.for_each_run([&](const TruthRun& run, std::size_t) {
+        for (int n = 0; n < run.count; ++n) {
+            Tile& t = tiles_[static_cast<std::size_t>((run.row / kRows) * across_ +
+                                                      (run.begin + n) / kColumns)];
+            t.rays[0] = std::min<int>(t.rays[0], run.ray[n]);
+            t.rays[1] = std::max<int>(t.rays[1], run.ray[n]);
+            t.r_mm[0] = std::min(t.r_mm[0], run.r_mm[n]);
+            t.r_mm[1] = std::max(t.r_mm[1], run.r_mm[n]);
+        }
+    });
+    for (Tile& t : tiles_)  // a little more and less than exp2_fading(), which is good to 1.1e-4
+        for (const int end : {0, 1})
+            t.fade[end] = static_cast<float>(
+                std::exp(-static_cast<double>(t.r_mm[1 - end]) / reach_mm) * (0.999 + 0.002 * end) -
+                1e-6 * (1 - end));
+}
+
+void PlainTiles::find(SimdTarget simd, const TruthFrameRows& f, bool hard_too) {
+    constexpr double kSlackVx = 0.05;  // more than places lose in single precision
+    const double column = 0.5 * (kColumns - 1), row = 0.5 * (kRows - 1);
+    for (std::size_t n = 0; n < tiles_.size(); ++n) {
+        label_[n] = -1;
+        if (tiles_[n].rays[1] < 0) continue;
+        const auto tile = static_cast<int>(n);
+        const int first_column = tile % across_ * kColumns, first_row = tile / across_ * kRows;
+        Box box;
+        for (int a = 0; a < 3; ++a) {
+            box.middle[a] =
+                f.origin[a] + (first_column + column) * f.across[a] + (first_row + row) * f.down[a];
+            box.half[a] = kSlackVx + column * std::abs(f.across[a]) + row * std::abs(f.down[a]);
+        }
+        if (!move(simd, f, n, box)) continue;
+        if (f.weight != nullptr) breathe(f, box);
+        const int label = label_in(f, box);
+        if (label < 0 || (!hard_too && f.hard[label] != 0)) continue;
+        if (f.press != nullptr && f.closed_label[label] != label) continue;
+        label_[n] = static_cast<std::int16_t>(label);
+    }
+}
+
+// Contact and pressing: false where no bound is known.
+bool PlainTiles::move(SimdTarget simd, const TruthFrameRows& f, std::size_t tile, Box& box) const {
+    if (f.gap_mm == nullptr && f.press == nullptr) return true;
+    const ScanGeometry& g = geometry_;
+    const Tile& t = tiles_[tile];
+    const auto n = static_cast<int>(tile);
+    const int first_column = n % across_ * kColumns, first_row = n / across_ * kRows;
+    const double x = (first_column + 0.5 * (kColumns - 1) - g.origin_x_px) * g.mm_per_px,
+                 z = (first_row + 0.5 * (kRows - 1) - g.origin_y_px) * g.mm_per_px;
+    const double half_mm = 0.5 * std::hypot(kColumns - 1, kRows - 1) * g.mm_per_px;
+    // The beam through the tile's middle, and how far those of its pixels turn away from it.
+    double dx = 0, dz = 1, turn = 0;
+    if (g.fan) {
+        const double away = std::hypot(x, z + g.radius_mm);
+        if (away < 2 * half_mm) return false;
+        dx = x / away;
+        dz = (z + g.radius_mm) / away;
+        turn = half_mm / (away - half_mm);
+    }
+    double along[2] = {0, 0}, side[2] = {0, 0};
+    if (f.gap_mm != nullptr) {
+        const auto [least, most] =
+            std::minmax_element(f.gap_mm + t.rays[0], f.gap_mm + t.rays[1] + 1);
+        if (!(*least >= 0)) return false;  // a beam in air
+        along[0] = std::max(static_cast<double>(*least * t.fade[0]), 0.0);
+        along[1] = static_cast<double>(*most * t.fade[1]);
+    }
+    if (f.press != nullptr) {
+        const press::PressView& v = *f.press;
+        if (!v.field->pools().empty()) return false;
+        const NeedleDent& needle = v.field->needle();
+        if (needle.moves() &&
+            std::hypot(x - needle.tip.x, z - needle.tip.z) < kDentReachMm + half_mm)
+            return false;
+        if (v.pressed && !v.columns_follow_beams) return false;
+        if (v.pressed) {
+            const int rows = std::min(v.active, v.capacity);
+            const auto node = [&](int ray) {
+                return static_cast<int>(
+                    ((static_cast<float>(ray) + 0.5f) * f.lines_per_ray - 0.5f) /
+                    static_cast<float>(v.every));
+            };
+            const auto sample = [&](float r) { return static_cast<int>(r / v.step_mm - 0.5f); };
+            const PressRange range =
+                press_range(simd, v, std::clamp(node(t.rays[0]) - 1, 0, v.node_stride - 1),
+                            std::clamp(node(t.rays[1]) + 2, 0, v.node_stride - 1),
+                            std::clamp(sample(t.r_mm[0]) - 1, 0, std::max(rows - 2, 0)),
+                            std::clamp(sample(t.r_mm[1]) + 2, 0, std::max(rows - 1, 0)));
+            for (const int end : {0, 1}) {
+                along[end] += static_cast<double>(range.along[end]);
+                side[end] += static_cast<double>(range.side[end]);
+            }
+        }
+    }
+    const double middle = 0.5 * (along[0] + along[1]), beside = 0.5 * (side[0] + side[1]);
+    const double half = 0.5 * (along[1] - along[0]), half_side = 0.5 * (side[1] - side[0]);
+    const double turned = turn * (std::abs(middle) + half + std::abs(beside) + half_side);
+    for (int a = 0; a < 3; ++a) {
+        const double u = dx * f.beam_x[a] + dz * f.beam_z[a],
+                     v = dz * f.beam_x[a] - dx * f.beam_z[a];
+        box.middle[a] += middle * u + beside * v;
+        box.half[a] += half * std::abs(u) + half_side * std::abs(v) +
+                       turned * std::hypot(f.beam_x[a], f.beam_z[a]);
+    }
+    return true;
+}
+
+// Breathing: by as much as the least and the greatest weight of the cells that the box meets.
+void PlainTiles::breathe(const TruthFrameRows& f, Box& box) {
+    int from[3], to[3];
+    for (int a = 0; a < 3; ++a) {
+        const auto node = [&](double at) {
+            return std::clamp(std::floor((at - f.first_vx[a]) * f.per_voxel), 0.0,
+                              f.lattice[a] - 1.0);
+        };
+        from[a] = std::min(static_cast<int>(node(box.middle[a] - box.half[a])), f.lattice[a] - 2);
+        to[a] = std::min(static_cast<int>(node(box.middle[a] + box.half[a])) + 1, f.lattice[a] - 1);
+    }
+    const std::ptrdiff_t row = f.lattice[0], plane = row * f.lattice[1];
+    float least = f.weight[from[2] * plane + from[1] * row + from[0]], most = least;
+    for (int k = from[2]; k <= to[2]; ++k)
+        for (int j = from[1]; j <= to[1]; ++j)
+            for (int i = from[0]; i <= to[0]; ++i) {
+                const float weight = f.weight[k * plane + j * row + i];
+                least = std::min(least, weight);
+                most = std::max(most, weight);
+            }
+    for (int a = 0; a < 3; ++a) {
+        box.middle[a] -= 0.5 * (least + most) * f.shift_vx[a];
+        box.half[a] += 0.5 * (most - least) * std::abs(f.shift_vx[a]);
+    }
+}
+
+// The label of all bricks that the box meets, where that is one without surfaces; -1 otherwise.
+int PlainTiles::label_in(const TruthFrameRows& f, const Box& box) {
+    int from[3], to[3];
+    bool leaves = false, outside = false;
+    for (int a = 0; a < 3; ++a) {
+        const double low = box.middle[a] - box.half[a] + 0.5,
+                     high = box.middle[a] + box.half[a] + 0.5;
+        leaves = leaves || low < 0 || high >= f.size[a];
+        outside = outside || high < 0 || low >= f.size[a];
+        from[a] = static_cast<int>(std::clamp(std::floor(low), 0.0, f.size[a] - 1.0)) >> 2;
+        to[a] = static_cast<int>(std::clamp(std::floor(high), 0.0, f.size[a] - 1.0)) >> 2;
+    }
+    if (outside) return 0;
+    if (f.region != nullptr) {
+        bool meets = true;
+        for (int a = 0; a < 3; ++a)
+            meets = meets && box.middle[a] + box.half[a] >= f.region_lower[a] &&
+                    box.middle[a] - box.half[a] < f.region_upper[a];
+        if (meets) return -1;
+    }
+    const auto brick = [&](int i, int j, int k) {
+        return static_cast<std::uint32_t>(f.bricks[k * f.bricks_xy + j * f.bricks_x + i]);
+    };
+    const std::uint32_t first = brick(from[0], from[1], from[2]);
+    if ((first & (kOneLabel | kHasSurface)) != kOneLabel) return -1;
+    const auto label = static_cast<int>(first & 0xFF);
+    if (leaves && label != 0) return -1;
+    for (int k = from[2]; k <= to[2]; ++k)
+        for (int j = from[1]; j <= to[1]; ++j)
+            for (int i = from[0]; i <= to[0]; ++i)
+                if (brick(i, j, k) != first) return -1;
+    return label;
 }
 
 void needle_plane(const ScanGeometry& g,

@@ -87,6 +87,42 @@ class TruthPixels {
     std::vector<float> r_mm_;
 };
 
+// Tiles of the picture that show one label throughout, a quarter of a torso's: their pixels are not
+// looked up one by one. A tile's places, moved as truth_rows.h moves them, are bounded by a box;
+// where all bricks that the box meets hold one label and no surface, so does the tile. Which tiles
+// are found changes no pixel.
+class PlainTiles {
+  public:
+    static constexpr int kColumns = 16, kRows = 8;
+
+    PlainTiles(const ScanGeometry& geometry, const TruthPixels& pixels, double contact_reach_mm);
+
+    // Finds those of a frame. hard_too: also of tissue that casts a shadow.
+    void find(SimdTarget simd, const TruthFrameRows& frame, bool hard_too);
+    // The label that a pixel's tile shows throughout; -1: it may show several.
+    int label(int column, int row) const {
+        return label_[static_cast<std::size_t>((row / kRows) * across_ + column / kColumns)];
+    }
+
+  private:
+    struct Tile {
+        int rays[2] = {1 << 30, -1};  // the least and the greatest of its scanned pixels
+        float r_mm[2] = {1e9f, -1e9f};
+        float fade[2] = {0, 1};  // of the gap that contact closes
+    };
+    struct Box {
+        double middle[3], half[3];  // voxels
+    };
+    bool move(SimdTarget simd, const TruthFrameRows& f, std::size_t tile, Box& box) const;
+    static void breathe(const TruthFrameRows& f, Box& box);
+    static int label_in(const TruthFrameRows& f, const Box& box);
+
+    const ScanGeometry& geometry_;
+    int across_ = 0;
+    std::vector<Tile> tiles_;
+    std::vector<std::int16_t> label_;
+};
+
 // 1 where the slab shows the needle's shaft, 2 within tip_mm of its tip, 0 elsewhere.
 void needle_plane(const ScanGeometry& geometry,
                   const TruthPixels& pixels,

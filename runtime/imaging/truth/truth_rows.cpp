@@ -2,6 +2,8 @@
 
 #include "runtime/imaging/truth/truth_rows.h"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 
 #include "formats/volume/boundary_record.h"
@@ -37,12 +39,38 @@ HWY_INLINE IntOf<D> rays_of(D, const TruthRun& run, int first) {
     return hn::PromoteTo(di, hn::LoadU(d16, run.ray + first));
 }
 
+// Numbers of a vector of rays, # rays in all. Rays ascend along a run, mostly one per pixel: those
+// of a vector of pixels lie in two vectors of the table, and gathering takes several times as long.
+// Lanes past the run's end hold any number.
+template <class D, class I>
+HWY_INLINE hn::Vec<D> of_rays(D d, const float* table, int rays, I ray, int first, int last) {
+    const hn::RebindToSigned<D> di;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    if (last - first >= 2 * lanes || rays < 2 * lanes) return hn::GatherIndex(d, table, ray);
+    const int from = std::min(first, rays - 2 * lanes);
+    const auto width = hn::Set(di, lanes);
+    const auto at =
+        hn::Min(hn::Max(hn::Sub(ray, hn::Set(di, from)), hn::Zero(di)), hn::Set(di, 2 * lanes - 1));
+    const auto upper = hn::Gt(at, hn::Set(di, lanes - 1));
+    const auto index = hn::IndicesFromVec(d, hn::Sub(at, hn::IfThenElseZero(upper, width)));
+    return hn::IfThenElse(hn::RebindMask(d, upper),
+                          hn::TableLookupLanes(hn::LoadU(d, table + from + lanes), index),
+                          hn::TableLookupLanes(hn::LoadU(d, table + from), index));
+}
+
 // Contact: moves each point along its beam by gap exp(-r / reach).
 template <class D, class V>
-HWY_INLINE void close_gap(
-    D d, const TruthFrameRows& f, const TruthRun& run, int first, V column, V& air, Places<D>& p) {
+HWY_INLINE void close_gap(D d,
+                          const TruthFrameRows& f,
+                          const TruthRun& run,
+                          int first,
+                          int used,
+                          V column,
+                          V& air,
+                          Places<D>& p) {
     const auto r = hn::LoadU(d, run.r_mm + first);
-    const auto gap = hn::GatherIndex(d, f.gap_mm, rays_of(d, run, first));
+    const auto gap = of_rays(d, f.gap_mm, f.rays, rays_of(d, run, first), run.ray[first],
+                             run.ray[first + used - 1]);
     air = hn::Min(gap, hn::Zero(d));  // below 0: air
     const auto shift =
         hn::Mul(hn::Max(gap, hn::Zero(d)), exp2_fading(d, hn::Mul(r, hn::Set(d, -f.per_reach))));
@@ -123,17 +151,34 @@ HWY_INLINE void breathe_back(D d, const TruthFrameRows& f, Places<D>& p) {
     const std::ptrdiff_t row = f.lattice[0], plane = row * f.lattice[1];
     const auto rows = hn::Add(hn::Mul(cell[2], hn::Set(di, f.lattice[1])), cell[1]);
     const auto index = hn::Add(hn::Mul(rows, hn::Set(di, f.lattice[0])), cell[0]);
+    // A vector of pixels meets few cells: spreading the corners of each over its lanes takes less
+    // time than gathering them.
+    V c000 = hn::Zero(d), c001 = c000, c010 = c000, c011 = c000;
+    V c100 = c000, c101 = c000, c110 = c000, c111 = c000;
+    HWY_ALIGN std::int32_t cells[kMaxLanes];
+    hn::Store(index, di, cells);
+    auto left = hn::Eq(index, index);
+    do {
+        const std::int32_t here = cells[hn::FindKnownFirstTrue(di, left)];
+        const auto same = hn::Eq(index, hn::Set(di, here));
+        const auto lanes = hn::RebindMask(d, same);
+        const float* from = f.weight + here;
+        const auto spread = [&](V& corner, const float* weight) HWY_ATTR {
+            corner = hn::IfThenElse(lanes, hn::Set(d, *weight), corner);
+        };
+        spread(c000, from), spread(c001, from + 1);
+        spread(c010, from + row), spread(c011, from + row + 1);
+        spread(c100, from + plane), spread(c101, from + plane + 1);
+        spread(c110, from + plane + row), spread(c111, from + plane + row + 1);
+        left = hn::AndNot(same, left);
+    } while (!hn::AllFalse(di, left));
     V sum = hn::Zero(d);
-    for (int z = 0; z < 2; ++z) {
-        for (int y = 0; y < 2; ++y) {
-            const V across = hn::Mul(share[2][z], share[1][y]);
-            const float* from = f.weight + z * plane + y * row;
-            for (int x = 0; x < 2; ++x) {
-                const V weight = hn::GatherIndex(d, from + x, index);
-                sum = hn::Add(sum, hn::Mul(hn::Mul(across, share[0][x]), weight));
-            }
-        }
-    }
+    const auto add = [&](int z, int y, V first, V second) HWY_ATTR {
+        const V across = hn::Mul(share[2][z], share[1][y]);
+        sum = hn::Add(sum, hn::Mul(hn::Mul(across, share[0][0]), first));
+        sum = hn::Add(sum, hn::Mul(hn::Mul(across, share[0][1]), second));
+    };
+    add(0, 0, c000, c001), add(0, 1, c010, c011), add(1, 0, c100, c101), add(1, 1, c110, c111);
     p.x = hn::Sub(p.x, hn::Mul(sum, hn::Set(d, f.shift_vx[0])));
     p.y = hn::Sub(p.y, hn::Mul(sum, hn::Set(d, f.shift_vx[1])));
     p.z = hn::Sub(p.z, hn::Mul(sum, hn::Set(d, f.shift_vx[2])));
@@ -174,11 +219,18 @@ HWY_INLINE I side_of_surface(D d, const TruthFrameRows& f, I record, I own, cons
     return hn::IfThenElse(beyond, second, own);
 }
 
+// The voxels nearest to points: brick, cell in it (-1: outside the volume, where brick is 0), and
+// the points relative to the voxels' centres.
 template <class D>
-HWY_INLINE IntOf<D> labels_at(D d, const TruthFrameRows& f, const Places<D>& p) {
+struct Voxels {
+    IntOf<D> brick, cell;
+    Places<D> off;
+};
+template <class D>
+HWY_INLINE Voxels<D> voxels_of(D d, const TruthFrameRows& f, const Places<D>& p) {
     const hn::RebindToSigned<D> di;
     using I = IntOf<D>;
-    // The nearest voxel. TruthRenderer draws no frame so far away that this is not exact.
+    // TruthRenderer draws no frame so far away that this is not exact.
     const hn::RebindToUnsigned<D> du;
     const auto shift = hn::Set(d, kRoundingShift);
     const auto bits = hn::Set(di, kRoundingBits);
@@ -194,7 +246,40 @@ HWY_INLINE IntOf<D> labels_at(D d, const TruthFrameRows& f, const Places<D>& p) 
         inside, hn::Add(hn::ShiftRight<2>(i),
                         hn::Add(hn::Mul(hn::ShiftRight<2>(j), hn::Set(di, f.bricks_x)),
                                 hn::Mul(hn::ShiftRight<2>(k), hn::Set(di, f.bricks_xy)))));
-    const I word = hn::GatherIndex(di, f.bricks, brick);
+    const I cell = hn::Or(hn::And(i, three), hn::Or(hn::ShiftLeft<2>(hn::And(j, three)),
+                                                    hn::ShiftLeft<4>(hn::And(k, three))));
+    return {brick,
+            hn::IfThenElse(inside, cell, hn::Set(di, -1)),
+            {hn::Sub(p.x, hn::Sub(hx, shift)), hn::Sub(p.y, hn::Sub(hy, shift)),
+             hn::Sub(p.z, hn::Sub(hz, shift))}};
+}
+
+// What the tables hold for bricks.
+template <class D>
+struct Entries {
+    IntOf<D> word, record;
+};
+template <class D, class I>
+HWY_INLINE Entries<D> entries_of(D, const TruthFrameRows& f, I brick) {
+    const hn::RebindToSigned<D> di;
+    const auto word = hn::GatherIndex(di, f.bricks, brick);
+    const auto plain = hn::Set(di, static_cast<std::int32_t>(kOneLabel));
+    const auto marks = hn::Set(di, static_cast<std::int32_t>(kOneLabel | kHasSurface));
+    if (f.boundary_table == nullptr || hn::AllTrue(di, hn::Eq(hn::And(word, marks), plain)))
+        return {word, word};
+    return {word, hn::GatherIndex(di, f.boundary_table, brick)};
+}
+
+template <class D>
+HWY_INLINE IntOf<D> labels_of(D d,
+                              const TruthFrameRows& f,
+                              const Voxels<D>& v,
+                              const Entries<D>& entries) {
+    const hn::RebindToSigned<D> di;
+    using I = IntOf<D>;
+    const I word = entries.word;
+    const auto inside = hn::Not(hn::Lt(v.cell, hn::Zero(di)));
+    const I cell = hn::And(v.cell, hn::Set(di, 63));
     const I own = hn::And(word, hn::Set(di, 0xFF));
     const auto mixed = hn::Not(hn::Lt(word, hn::Zero(di)));
     // Bricks of one label and no surface: most of a body.
@@ -202,8 +287,6 @@ HWY_INLINE IntOf<D> labels_at(D d, const TruthFrameRows& f, const Places<D>& p) 
         mixed,
         hn::Eq(hn::And(word, hn::Set(di, static_cast<std::int32_t>(kHasSurface))), hn::Zero(di)));
     if (hn::AllFalse(di, hn::AndNot(plain, inside))) return hn::IfThenElseZero(inside, own);
-    const I cell = hn::Or(hn::And(i, three), hn::Or(hn::ShiftLeft<2>(hn::And(j, three)),
-                                                    hn::ShiftLeft<4>(hn::And(k, three))));
     I label = own;
     if (!hn::AllFalse(di, mixed)) {
         const I at = hn::IfThenElseZero(mixed, hn::Or(hn::ShiftLeft<6>(word), cell));
@@ -212,7 +295,7 @@ HWY_INLINE IntOf<D> labels_at(D d, const TruthFrameRows& f, const Places<D>& p) 
     }
     label = hn::IfThenElseZero(inside, label);
     if (f.boundary_table == nullptr) return label;
-    const I entry = hn::GatherIndex(di, f.boundary_table, brick);
+    const I entry = entries.record;
     const auto alike = hn::Lt(entry, hn::Zero(di));
     const I none = hn::Set(di, static_cast<std::int32_t>(kNoBoundary));
     I record = none;
@@ -226,15 +309,42 @@ HWY_INLINE IntOf<D> labels_at(D d, const TruthFrameRows& f, const Places<D>& p) 
         record = hn::IfThenElse(stored, hn::GatherIndex(di, f.boundary_pool, at), record);
     }
     record = hn::IfThenElse(inside, record, none);
-    return side_of_surface(
-        d, f, record, label,
-        Places<D>{hn::Sub(p.x, hn::Sub(hx, shift)), hn::Sub(p.y, hn::Sub(hy, shift)),
-                  hn::Sub(p.z, hn::Sub(hz, shift))});
+    return side_of_surface(d, f, record, label, v.off);
 }
 
-template <class D>
-HWY_INLINE IntOf<D> labels_shown(D d, const TruthFrameRows& f, const Places<D>& p) {
-    const auto label = labels_at(d, f, p);
+// A stretch of a run, on its way from places to labels. Tables and pools lie far apart in memory: a
+// vector that waits for each in turn takes twice as long as one whose numbers were asked for while
+// others were worked on.
+constexpr int kStretch = 128;
+struct Stretch {
+    HWY_ALIGN float x[kStretch + kMaxLanes], y[kStretch + kMaxLanes], z[kStretch + kMaxLanes];
+    HWY_ALIGN std::int32_t brick[kStretch + kMaxLanes], cell[kStretch + kMaxLanes],
+        word[kStretch + kMaxLanes], record[kStretch + kMaxLanes], state[kStretch + kMaxLanes];
+};
+constexpr std::int32_t kInAir = 1, kClosed = 2;  // of Stretch::state
+
+// A voxel is wider than two pixels.
+constexpr int kAskEvery = 4;
+inline void ask_for_entries(const TruthFrameRows& f, const Stretch& s, int begin, int end) {
+    for (int n = begin; n < end; n += kAskEvery) {
+        hwy::Prefetch(f.bricks + s.brick[n]);
+        if (f.boundary_table != nullptr) hwy::Prefetch(f.boundary_table + s.brick[n]);
+    }
+}
+inline void ask_for_voxels(const TruthFrameRows& f, const Stretch& s, int begin, int end) {
+    for (int n = begin; n < end; n += kAskEvery) {
+        const auto cell = static_cast<std::uint32_t>(s.cell[n] & 63);
+        const auto word = static_cast<std::uint32_t>(s.word[n]),
+                   record = static_cast<std::uint32_t>(s.record[n]);
+        if (s.word[n] >= 0) hwy::Prefetch(f.label_pool + (word << 4 | cell >> 2));
+        if (s.record[n] >= 0 && f.boundary_table != nullptr)
+            hwy::Prefetch(f.boundary_pool + (static_cast<std::size_t>(record) << 6 | cell));
+    }
+}
+
+// The label that the fine region holds where it covers a point, and `label` elsewhere.
+template <class D, class I>
+HWY_INLINE I labels_of_region(D d, const TruthFrameRows& f, const Places<D>& p, I label) {
     if (f.region == nullptr) return label;
     auto here = hn::Eq(p.x, p.x);
     const auto own = [&](auto at, int a) HWY_ATTR {
@@ -245,7 +355,9 @@ HWY_INLINE IntOf<D> labels_shown(D d, const TruthFrameRows& f, const Places<D>& 
     const Places<D> place{own(p.x, 0), own(p.y, 1), own(p.z, 2)};
     if (hn::AllFalse(d, here)) return label;
     const auto mask = hn::RebindMask(hn::RebindToSigned<D>(), here);
-    return hn::IfThenElse(mask, labels_at(d, *f.region, place), label);
+    const Voxels<D> voxels = voxels_of(d, *f.region, place);
+    return hn::IfThenElse(
+        mask, labels_of(d, *f.region, voxels, entries_of(d, *f.region, voxels.brick)), label);
 }
 
 // Makes the rays that a hard pixel covers dark from it on.
@@ -280,6 +392,8 @@ HWY_INLINE void darken(D,
 
 void labels_of_run(const TruthFrameRows& f,
                    const TruthRun& run,
+                   int begin,
+                   int end,
                    std::uint8_t* labels,
                    std::uint32_t* count_of_label,
                    std::span<float> first_hard_mm,
@@ -297,53 +411,119 @@ void labels_of_run(const TruthFrameRows& f,
     const auto base_x = base(0), base_y = base(1), base_z = base(2);
     const auto step = [&](int a) HWY_ATTR { return hn::Set(d, static_cast<float>(f.across[a])); };
     const auto step_x = step(0), step_y = step(1), step_z = step(2);
-    for (int first = 0; first < run.count; first += lanes) {
-        const auto n = hn::Add(iota, hn::Set(d, static_cast<float>(first)));
-        Places<D> p{hn::Add(base_x, hn::Mul(n, step_x)), hn::Add(base_y, hn::Mul(n, step_y)),
-                    hn::Add(base_z, hn::Mul(n, step_z))};
-        auto air = hn::Zero(d);
-        if (f.gap_mm != nullptr) {
+    Stretch s;
+    for (int from = begin; from < end; from += kStretch) {
+        const int to = std::min(from + kStretch, end);
+        for (int first = from; first < to; first += lanes) {
+            const int used = std::min(lanes, to - first), at = first - from;
+            const auto n = hn::Add(iota, hn::Set(d, static_cast<float>(first)));
             const auto column = hn::Add(n, hn::Set(d, static_cast<float>(run.begin)));
-            close_gap(d, f, run, first, column, air, p);
+            Places<D> p{hn::Add(base_x, hn::Mul(n, step_x)), hn::Add(base_y, hn::Mul(n, step_y)),
+                        hn::Add(base_z, hn::Mul(n, step_z))};
+            auto state = hn::Zero(di);
+            if (f.gap_mm != nullptr) {
+                auto air = hn::Zero(d);
+                close_gap(d, f, run, first, used, column, air, p);
+                state = hn::IfThenElseZero(hn::RebindMask(di, hn::Lt(air, hn::Zero(d))),
+                                           hn::Set(di, kInAir));
+            }
+            if (f.press != nullptr) {
+                auto closed = hn::Zero(di);
+                press_back(d, f, run, first, column, p, closed);
+                state = hn::Or(
+                    state, hn::IfThenElseZero(hn::Gt(closed, hn::Zero(di)), hn::Set(di, kClosed)));
+            }
+            if (f.weight != nullptr) breathe_back(d, f, p);
+            const Voxels<D> voxels = voxels_of(d, f, p);
+            hn::Store(p.x, d, s.x + at), hn::Store(p.y, d, s.y + at), hn::Store(p.z, d, s.z + at);
+            hn::Store(voxels.brick, di, s.brick + at);
+            hn::Store(voxels.cell, di, s.cell + at);
+            hn::Store(state, di, s.state + at);
+            ask_for_entries(f, s, at, at + used);
         }
-        auto closed = hn::Zero(di);
-        if (f.press != nullptr) {
-            const auto column = hn::Add(n, hn::Set(d, static_cast<float>(run.begin)));
-            press_back(d, f, run, first, column, p, closed);
+        for (int at = 0; at < to - from; at += lanes) {
+            const Entries<D> entries = entries_of(d, f, hn::Load(di, s.brick + at));
+            hn::Store(entries.word, di, s.word + at);
+            hn::Store(entries.record, di, s.record + at);
+            ask_for_voxels(f, s, at, std::min(at + lanes, to - from));
         }
-        if (f.weight != nullptr) breathe_back(d, f, p);
-        auto label = labels_shown(d, f, p);
-        const auto is_closed = hn::Gt(closed, hn::Zero(di));
-        if (!hn::AllFalse(di, is_closed))
-            label = hn::IfThenElse(is_closed, hn::GatherIndex(di, f.closed_label, label), label);
-        label = hn::IfThenElseZero(hn::RebindMask(di, hn::Ge(air, hn::Zero(d))), label);
-        const int used = std::min(lanes, run.count - first);
-        HWY_ALIGN std::uint8_t bytes[kMaxLanes];
-        hn::Store(hn::DemoteTo(d8, label), d8, bytes);
-        std::copy_n(bytes, used, labels + first);
-        // Few labels meet in a vector: each is counted at once.
-        auto left = hn::FirstN(di, static_cast<std::size_t>(used));
-        std::int32_t any_hard = 0;
-        do {
-            const std::uint8_t value = bytes[hn::FindKnownFirstTrue(di, left)];
-            const auto same = hn::And(left, hn::Eq(label, hn::Set(di, value)));
-            count_of_label[value] += static_cast<std::uint32_t>(hn::CountTrue(di, same));
-            any_hard |= f.hard[value];
-            left = hn::AndNot(same, left);
-        } while (!hn::AllFalse(di, left));
-        if (any_hard == 0) continue;
-        if (!first_hard_mm.empty())
-            darken(d, f, run, first, used, label, rays_per_px_at_face, first_hard_mm);
+        for (int first = from; first < to; first += lanes) {
+            const int used = std::min(lanes, to - first), at = first - from;
+            const Places<D> p{hn::Load(d, s.x + at), hn::Load(d, s.y + at), hn::Load(d, s.z + at)};
+            auto label =
+                labels_of(d, f, voxels_of(d, f, p),
+                          Entries<D>{hn::Load(di, s.word + at), hn::Load(di, s.record + at)});
+            label = labels_of_region(d, f, p, label);
+            const auto state = hn::Load(di, s.state + at);
+            if (!hn::AllTrue(di, hn::Eq(state, hn::Zero(di)))) {
+                const auto is = [&](std::int32_t bit) HWY_ATTR {
+                    return hn::Gt(hn::And(state, hn::Set(di, bit)), hn::Zero(di));
+                };
+                if (f.press != nullptr)
+                    label = hn::IfThenElse(is(kClosed), hn::GatherIndex(di, f.closed_label, label),
+                                           label);
+                label = hn::IfThenElse(is(kInAir), hn::Zero(di), label);
+            }
+            HWY_ALIGN std::uint8_t bytes[kMaxLanes];
+            hn::Store(hn::DemoteTo(d8, label), d8, bytes);
+            std::copy_n(bytes, used, labels + first);
+            // Few labels meet in a vector: each is counted at once.
+            auto left = hn::FirstN(di, static_cast<std::size_t>(used));
+            std::int32_t any_hard = 0;
+            do {
+                const std::uint8_t value = bytes[hn::FindKnownFirstTrue(di, left)];
+                const auto same = hn::And(left, hn::Eq(label, hn::Set(di, value)));
+                count_of_label[value] += static_cast<std::uint32_t>(hn::CountTrue(di, same));
+                any_hard |= f.hard[value];
+                left = hn::AndNot(same, left);
+            } while (!hn::AllFalse(di, left));
+            if (any_hard != 0 && !first_hard_mm.empty())
+                darken(d, f, run, first, used, label, rays_per_px_at_face, first_hard_mm);
+        }
     }
 }
 
-void shadows_of_run(const TruthRun& run, const float* first_hard_mm, std::uint8_t* shadowed) {
+void range_of_shifts(const press::PressView& v,
+                     int first_node,
+                     int last_node,
+                     int first_sample,
+                     int last_sample,
+                     PressRange& range) {
+    const hn::ScalableTag<float> d;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    const auto over = [&](const std::vector<float>& plane, float* ends) HWY_ATTR {
+        const float* corner =
+            plane.data() + static_cast<std::ptrdiff_t>(first_sample) * v.node_stride + first_node;
+        const auto any = hn::Set(d, *corner);
+        auto least = any, most = any;
+        for (int node = first_node; node <= last_node; node += lanes) {
+            const auto in = hn::FirstN(d, static_cast<std::size_t>(last_node - node + 1));
+            const float* from = corner + (node - first_node);
+            for (int k = first_sample; k <= last_sample; ++k, from += v.node_stride) {
+                const auto shift = hn::IfThenElse(in, hn::LoadU(d, from), any);
+                least = hn::Min(least, shift);
+                most = hn::Max(most, shift);
+            }
+        }
+        ends[0] = hn::GetLane(hn::MinOfLanes(d, least));
+        ends[1] = hn::GetLane(hn::MaxOfLanes(d, most));
+    };
+    over(v.along, range.along);
+    over(v.side, range.side);
+}
+
+void shadows_of_run(const TruthRun& run,
+                    std::span<const float> first_hard_mm,
+                    std::uint8_t* shadowed) {
     const hn::ScalableTag<float> d;
     const hn::RebindToSigned<decltype(d)> di;
     const hn::Rebind<std::uint8_t, decltype(d)> d8;
     const int lanes = static_cast<int>(hn::Lanes(d));
+    const int rays = static_cast<int>(first_hard_mm.size());
     for (int first = 0; first < run.count; first += lanes) {
-        const auto dark = hn::GatherIndex(d, first_hard_mm, rays_of(d, run, first));
+        const int last = std::min(first + lanes, run.count) - 1;
+        const auto dark = of_rays(d, first_hard_mm.data(), rays, rays_of(d, run, first),
+                                  run.ray[first], run.ray[last]);
         const auto behind = hn::Gt(hn::LoadU(d, run.r_mm + first), dark);
         HWY_ALIGN std::uint8_t bytes[kMaxLanes];
         hn::Store(hn::DemoteTo(d8, hn::IfThenElseZero(hn::RebindMask(di, behind), hn::Set(di, 1))),
@@ -361,9 +541,12 @@ void depths_of_run(const TruthFrameRows& f,
     for (int first = 0; first < run.count; first += lanes) {
         const auto r = hn::LoadU(d, run.r_mm + first);
         const auto ray = rays_of(d, run, first);
-        auto depth = hn::Sub(r, hn::GatherIndex(d, entry_mm, ray));
+        const int lowest = run.ray[first],
+                  highest = run.ray[std::min(first + lanes, run.count) - 1];
+        auto depth = hn::Sub(r, of_rays(d, entry_mm, f.rays, ray, lowest, highest));
         if (f.gap_mm != nullptr) {
-            const auto gap = hn::Max(hn::GatherIndex(d, f.gap_mm, ray), hn::Zero(d));
+            const auto gap =
+                hn::Max(of_rays(d, f.gap_mm, f.rays, ray, lowest, highest), hn::Zero(d));
             depth =
                 hn::Add(depth, hn::Mul(gap, exp2_fading(d, hn::Mul(r, hn::Set(d, -f.per_reach)))));
         }
@@ -384,23 +567,39 @@ HWY_AFTER_NAMESPACE();
 namespace sonocase::runtime {
 
 HWY_EXPORT(labels_of_run);
+HWY_EXPORT(range_of_shifts);
 HWY_EXPORT(shadows_of_run);
 HWY_EXPORT(depths_of_run);
 
 void truth_labels(SimdTarget simd,
                   const TruthFrameRows& frame,
                   const TruthRun& run,
+                  int begin,
+                  int end,
                   std::uint8_t* labels,
                   std::uint32_t* count_of_label,
                   std::span<float> first_hard_mm,
                   float rays_per_px_at_face) {
     HWY_DISPATCH_TABLE(labels_of_run)
-    [simd.index](frame, run, labels, count_of_label, first_hard_mm, rays_per_px_at_face);
+    [simd.index](frame, run, begin, end, labels, count_of_label, first_hard_mm,
+                 rays_per_px_at_face);
+}
+
+PressRange press_range(SimdTarget simd,
+                       const press::PressView& view,
+                       int first_node,
+                       int last_node,
+                       int first_sample,
+                       int last_sample) {
+    PressRange range;
+    HWY_DISPATCH_TABLE(range_of_shifts)
+    [simd.index](view, first_node, last_node, first_sample, last_sample, range);
+    return range;
 }
 
 void truth_shadows(SimdTarget simd,
                    const TruthRun& run,
-                   const float* first_hard_mm,
+                   std::span<const float> first_hard_mm,
                    std::uint8_t* shadowed) {
     HWY_DISPATCH_TABLE(shadows_of_run)[simd.index](run, first_hard_mm, shadowed);
 }

@@ -48,12 +48,24 @@ struct TruthFrameRows {
     const press::PressView* press = nullptr;
     const std::int32_t* closed_label = nullptr;  // # labels: the label shown where a lumen closed
     float lines_per_ray = 1;
+    int rays = 0;  // at least 64
 
     // Breathing; null weight: none.
     const float* weight = nullptr;
     std::int32_t lattice[3];
     float first_vx[3], per_voxel = 0, shift_vx[3];
 };
+
+// The least and greatest of the probe's shifts over some nodes and samples of a press view, mm.
+struct PressRange {
+    float along[2], side[2];
+};
+PressRange press_range(SimdTarget simd,
+                       const press::PressView& view,
+                       int first_node,
+                       int last_node,
+                       int first_sample,
+                       int last_sample);
 
 // One run of pixels.
 struct TruthRun {
@@ -62,11 +74,14 @@ struct TruthRun {
     const float* r_mm = nullptr;         // depth along the beam; likewise
 };
 
-// Writes labels, counts them, and lowers first_hard_mm (# rays, or empty) of the rays whose pixels
-// are hard. rays_per_px_at_face: rays within a pixel's width where the beams leave the probe.
+// Writes labels of the run's pixels [begin, end), counts them, and lowers first_hard_mm (# rays, or
+// empty) of the rays whose pixels are hard. labels: of the whole run. rays_per_px_at_face: rays
+// within a pixel's width where the beams leave the probe.
 void truth_labels(SimdTarget simd,
                   const TruthFrameRows& frame,
                   const TruthRun& run,
+                  int begin,
+                  int end,
                   std::uint8_t* labels,
                   std::uint32_t* count_of_label,
                   std::span<float> first_hard_mm,
@@ -75,7 +90,7 @@ void truth_labels(SimdTarget simd,
 // shadowed[i] = r > first_hard_mm[ray].
 void truth_shadows(SimdTarget simd,
                    const TruthRun& run,
-                   const float* first_hard_mm,
+                   std::span<const float> first_hard_mm,
                    std::uint8_t* shadowed);
 
 // depth = r + gap exp(-r / reach) - entry; see TruthPlanes::skin_depth_mm.

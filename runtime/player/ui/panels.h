@@ -50,6 +50,7 @@ struct TaskCardInput {
     const MouseTracker* mouse;                 // null: not in use
     const GuidedStart* guide;                  // null: does not run
     bool exam, replays;
+    bool expert;         // what is replayed is a script of the exercise
     bool flipped;        // left and right of the picture
     bool live;           // false: no reading, values are dashes
     bool shows_targets;  // false: neither distances nor places

@@ -244,8 +244,9 @@ std::optional<std::pair<int, ToolOf>> draw_roles(Ui& ui, Box& room, const SetupP
 
 void draw_tracker_words(Ui& ui, Box& room, const SetupPageInput& input) {
     const TrackerHealth& tracker = input.tracker;
-    ui.text(room.take_top(22), tracker.device.empty() ? tr("No tracker") : tracker.device,
-            Type::bold, colour::kText, Align::left, true);
+    ui.text(room.take_top(22),
+            tracker.device.empty() ? tr("No tracker") : tr_message(tracker.device), Type::bold,
+            colour::kText, Align::left, true);
     const std::string state =
         input.live && tracker.phase == TrackerPhase::streaming
             ? filled(tr("%.0f readings per second"), tracker.rate_hz)

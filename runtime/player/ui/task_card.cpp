@@ -224,7 +224,7 @@ void draw_step_tab(Ui& ui, const Box& tab, int number, StepState state) {
     }
 }
 
-// The steps of a procedure: which are done, and what is to be done now. An exam does not say.
+// The steps of a procedure: which are done, and what is to be done now.
 void draw_procedure_steps(Ui& ui, Box& room, const TaskCardInput& input) {
     const ProcedureView& view = *input.procedure;
     const int count = static_cast<int>(input.texts.steps.size());
@@ -245,7 +245,9 @@ void draw_procedure_steps(Ui& ui, Box& room, const TaskCardInput& input) {
     const ExerciseTexts::Step* step =
         over ? nullptr : &input.texts.steps[static_cast<std::size_t>(view.present_step)];
     const std::string title =
-        over ? tr("All steps are behind you: finish the attempt") : step->title;
+        over ? tr(input.replays ? "The procedure is over"
+                                : "All steps are behind you: finish the attempt")
+             : step->title;
     const float high = std::min(ui.paragraph_height(room.w, title, Type::bold), 40.0f);
     if (room.h < high) return;
     ui.paragraph(room.take_top(high, 4), title, Type::bold, colour::kText, true);
@@ -356,9 +358,25 @@ void draw_question(Ui& ui, Box& room, const TaskCardInput& input, TaskCardReques
         request.put_off = question;
 }
 
+// Where a procedure stands: its steps, what was done, and what went wrong. An exam that runs says
+// what was done alone.
+void draw_standing(Ui& ui, Box& room, const TaskCardInput& input) {
+    const bool tells = !input.exam || input.replays;
+    const ProcedureState& state = input.procedure->state;
+    if (tells) draw_procedure_steps(ui, room, input);
+    const std::string done = done_words(input, state);
+    if (!done.empty()) draw_small(ui, room, done, 0);
+    for (std::size_t k = 0; tells && k < state.complication_s.size(); ++k) {
+        if (state.complication_s[k] < 0 || room.h < 24) continue;
+        const Box line = room.take_top(22, 2);
+        ui.icon(Icon::warn, line.x, line.y + 2, 18, colour::kBad);
+        ui.text({line.x + 24, line.y, line.w - 24, line.h}, tr(complication_titles()[k]),
+                Type::small, colour::kBad, Align::left, true);
+    }
+}
+
 // The card while a procedure runs.
 void draw_procedure(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
-    const ProcedureView& view = *input.procedure;
     if (question_waits(input)) return draw_question(ui, room, input, request);
     if (next_question(input, -1) >= 0) {  // was put off
         ButtonStyle style;
@@ -369,18 +387,7 @@ void draw_procedure(Ui& ui, Box& room, const TaskCardInput& input, TaskCardReque
             request.put_off = -1;
     }
     draw_tray(ui, room, input, request);  // before the steps: without it nothing can be done
-    if (!input.exam) draw_procedure_steps(ui, room, input);
-    const std::string done = done_words(input, view.state);
-    if (!done.empty()) draw_small(ui, room, done, 0);
-    if (!input.exam) {
-        for (std::size_t k = 0; k < view.state.complication_s.size(); ++k) {
-            if (view.state.complication_s[k] < 0 || room.h < 24) continue;
-            const Box line = room.take_top(22, 2);
-            ui.icon(Icon::warn, line.x, line.y + 2, 18, colour::kBad);
-            ui.text({line.x + 24, line.y, line.w - 24, line.h}, tr(complication_titles()[k]),
-                    Type::small, colour::kBad, Align::left, true);
-        }
-    }
+    draw_standing(ui, room, input);
     draw_values(ui, room, input);
 }
 
@@ -525,10 +532,17 @@ TaskCardRequest draw_task_card(Ui& ui, const Box& card, const TaskCardInput& inp
         return request;
     }
     if (input.replays) {
-        ui.paragraph(room,
-                     tr("What was done, beside the straight way (dotted). The bar below the "
-                        "picture goes to any moment, at any speed."),
-                     Type::small, colour::kDim, true);
+        if (input.procedure != nullptr) {
+            draw_standing(ui, room, input);
+            room.take_top(8);
+        }
+        ui.paragraph(
+            room,
+            tr(input.expert ? "How it is done. The bar below the picture goes to any moment, at "
+                              "any speed."
+                            : "What was done, beside the straight way (dotted). The bar below the "
+                              "picture goes to any moment, at any speed."),
+            Type::small, colour::kDim, true);
         return request;
     }
     if (shown_procedure(input)) {

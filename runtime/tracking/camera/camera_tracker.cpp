@@ -84,7 +84,7 @@ void CameraTracker::stream(PictureSource& source) {
     }
     {
         const std::lock_guard lock(mutex_);
-        health_.device = "Camera " + source.name();
+        health_.device = Message("Camera {}", {source.name()});
         health_.phase = TrackerPhase::starting;
         ++health_.connects;
     }

@@ -63,7 +63,7 @@ class V4l2Camera final : public PictureSource {
         file_ = calls_.open(path.c_str());
         if (file_ < 0) {
             if (errno == EACCES)
-                return Error{"This user may not use the camera.", path,
+                return Error{"This user may not use the camera", path,
                              "add the user to the group video, and log in again"};
             return Error{"No camera is connected", "", "connect one"};
         }
@@ -119,7 +119,7 @@ class V4l2Camera final : public PictureSource {
             wanted.fmt.pix.field = V4L2_FIELD_NONE;
             if (calls_.control(file_, VIDIOC_S_FMT, &wanted) < 0) {
                 if (errno == EBUSY)
-                    return Error{"Another program uses the camera.", path, "close that program"};
+                    return Error{"Another program uses the camera", path, "close that program"};
                 continue;
             }
             if (wanted.fmt.pix.pixelformat != format) continue;
@@ -129,7 +129,7 @@ class V4l2Camera final : public PictureSource {
             bytes_per_row_ = wanted.fmt.pix.bytesperline;
             return Done{};
         }
-        return Error{"The camera gives neither MJPEG nor YUYV pictures.", path,
+        return Error{"The camera gives neither MJPEG nor YUYV pictures", path,
                      "use another camera"};
     }
 
@@ -149,7 +149,7 @@ class V4l2Camera final : public PictureSource {
         wanted.count = kBuffers;
         wanted.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
         wanted.memory = V4L2_MEMORY_MMAP;
-        const Error busy{"Another program uses the camera.", path, "close that program"};
+        const Error busy{"Another program uses the camera", path, "close that program"};
         if (calls_.control(file_, VIDIOC_REQBUFS, &wanted) < 0 || wanted.count == 0) return busy;
         for (std::uint32_t k = 0; k < std::min<std::uint32_t>(wanted.count, kBuffers); ++k) {
             v4l2_buffer buffer{};

@@ -8,6 +8,7 @@
 #include "formats/base/constants.h"
 #include "formats/calibration/point.h"
 #include "support/calibration_motion.h"
+#include "support/hard_case.h"
 
 namespace sonocase {
 namespace {
@@ -43,6 +44,7 @@ TEST(PointTrouble, PosesReadTheWrongWayAreNamed) {
               std::string::npos);
 }
 
+using testing::HardCase;
 using testing::pivot_recording;
 using testing::PivotMotion;
 using testing::Random;
@@ -78,11 +80,13 @@ TEST(PointTrouble, NearSingleAxisIsToldWithItsAxis) {
     EXPECT_TRUE(fit.determined);
     EXPECT_GT(std::abs(dot(fit.weak_axis, axis)), 0.99);
     EXPECT_GT(fit.weak_sigma_mm, 1);
-    EXPECT_LT(std::abs(dot(fit.tip_mm - motion.tip_mm, axis)), 4 * fit.weak_sigma_mm);
+    HardCase off("error along the weak axis over its sigma", HardCase::at_most, 4, "");
+    off.see(std::abs(dot(fit.tip_mm - motion.tip_mm, axis)) / fit.weak_sigma_mm);
     EXPECT_TRUE(says(fit, "tilt it further"));
 }
 
 TEST(PointTrouble, SingleAxisIsUndeterminedAlongItAndSaysWhatToAdd) {
+    HardCase across("tip across the one axis, noise of 0.3 mm", HardCase::at_most, 0.3, "mm");
     for (double noise_mm : {0.0, 0.3}) {
         Random random(9);
         const Vector3 axis = normalized({0, 1, 1});
@@ -104,7 +108,9 @@ TEST(PointTrouble, SingleAxisIsUndeterminedAlongItAndSaysWhatToAdd) {
         EXPECT_TRUE(std::isinf(fit.sigma_mm.y) && std::isinf(fit.sigma_mm.z));
         EXPECT_FALSE(std::isinf(fit.sigma_mm.x));
         // What is determined is right all the same.
-        EXPECT_LT(norm(cross(fit.tip_mm - motion.tip_mm, axis)), 1e-9 + noise_mm);
+        const double off = norm(cross(fit.tip_mm - motion.tip_mm, axis));
+        EXPECT_LT(off, 1e-9 + noise_mm);
+        across.see(off);
         EXPECT_NEAR(dot(fit.tip_mm, axis), 0, 1e-9);
     }
 }
@@ -137,6 +143,8 @@ TEST(PointTrouble, StillSensorTooFewAndTwoPosesHaveTheirOwnWords) {
 }
 
 TEST(PointTrouble, EveryKindOfBadRowIsNamedAndLeftOut) {
+    HardCase tip("tip, twenty of a hundred rows spoilt in each of eight ways", HardCase::at_most,
+                 0.1, "mm");
     Random random(11);
     PivotMotion motion;
     motion.noise_mm = 0.1;
@@ -148,7 +156,7 @@ TEST(PointTrouble, EveryKindOfBadRowIsNamedAndLeftOut) {
         EXPECT_TRUE(fit.determined) << words;
         EXPECT_TRUE(says(fit, words)) << words;
         EXPECT_EQ(fit.poses, 80) << words;
-        EXPECT_LT(norm(fit.tip_mm - motion.tip_mm), 0.1) << words;
+        tip.see(norm(fit.tip_mm - motion.tip_mm));
     };
     check("status other than OK", [](Pose& p) { p.ok = false; });
     check("NaN", [](Pose& p) { p.tracker_from_tool.translation.y = NAN; });
@@ -187,7 +195,8 @@ TEST(PointTrouble, RoundedRotationsAreStraightenedAndSaidSo) {
     }
     const PointFit fit = fit_point(poses);
     EXPECT_TRUE(says(fit, "nearest rotation"));
-    EXPECT_LT(norm(fit.tip_mm - motion.tip_mm), 1);
+    HardCase tip("tip, rotations rounded to two decimals", HardCase::at_most, 1, "mm");
+    tip.see(norm(fit.tip_mm - motion.tip_mm));
 }
 
 TEST(PointTrouble, QuaternionSignFlips) {
@@ -210,11 +219,12 @@ TEST(PointTrouble, QuaternionSignFlips) {
             pose.tracker_from_tool.rotation = rotation_from_quaternion({q.w, -q.x, -q.y, -q.z});
         conjugated.push_back(pose);
     }
-    EXPECT_LT(norm(fit_point(negated).tip_mm - motion.tip_mm), 1e-9);
+    HardCase tip("tip, signs of quaternions that flip", HardCase::at_most, 1e-9, "mm");
+    tip.see(norm(fit_point(negated).tip_mm - motion.tip_mm));
     EXPECT_TRUE(fit_point(negated).warnings.empty());
     const PointFit fit = fit_point(conjugated);
     EXPECT_TRUE(says(fit, "quaternion sign"));
-    EXPECT_LT(norm(fit.tip_mm - motion.tip_mm), 1e-9);
+    tip.see(norm(fit.tip_mm - motion.tip_mm));
 }
 
 TEST(PointTrouble, WrongConventionsAreRecognised) {

@@ -48,7 +48,11 @@ MarkerView view_of(const CameraModel& camera,
             seen.whitening[9 * (2 * k)] = seen.whitening[9 * (2 * k + 1)] =
                 1 / std::max(noise_px, 0.01);
         }
-        if (inside) view.tags.push_back(seen);
+        if (!inside) continue;
+        // A pattern with straight edges lies so over a tag that the lens bends.
+        const std::array<Pixel, 4> bend = bend_of_tag(camera, seen.corners);
+        for (int k = 0; k < 4; ++k) seen.corners[k].x += bend[k].x, seen.corners[k].y += bend[k].y;
+        view.tags.push_back(seen);
     }
     return view;
 }

@@ -23,8 +23,9 @@ CaseSize size_of(double label_voxels, double cooked, double labels, double surfa
     return size;
 }
 
-// Processor seconds of whole commands, two threads: builds that the law was fitted to.
-TEST(BuildTime, IsWithinAnEighthOfWhatBuildsTook) {
+// Processor seconds of whole commands, two threads: builds that the law was fitted to. The farthest
+// is 6.7 % off, the smallest.
+TEST(BuildTime, IsWithinATwelfthOfWhatBuildsTook) {
     const struct {
         double cooked, processor_s;
     } demo[] = {{1.47, 7.34}, {4.95, 8.86},  {11.7, 11.6},
@@ -36,7 +37,7 @@ TEST(BuildTime, IsWithinAnEighthOfWhatBuildsTook) {
                 analytic ? size_of(2.4, m.cooked, 48, 0.69) : size_of(1.4, m.cooked, 68, 0.39);
             if (analytic) size.sampling_s = 0.38 * 2.4;
             const BuildTime time = build_time(size, 64, 1, 2);
-            EXPECT_NEAR(time.processor_s / m.processor_s, 1, 0.12) << m.cooked;
+            EXPECT_NEAR(time.processor_s / m.processor_s, 1, 1 / 12.0) << m.cooked;
             EXPECT_LT(time.alone_s, time.processor_s);
             EXPECT_GT(time.alone_s, time.processor_s / 2);
         }

@@ -8,6 +8,7 @@
 #include "formats/machine/machine.h"
 #include "look_clip.h"
 #include "pipeline/look/look.h"
+#include "support/hard_case.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -48,10 +49,13 @@ TEST(LookFit, AModernFanComesBack) {
     EXPECT_EQ(m.grey.map, GreyMap::power);
     EXPECT_NEAR(m.looks.count, truth.looks.count, 2);
     EXPECT_NEAR(m.grey.exponent, truth.grey.exponent, 0.2);
+    sonocase::testing::HardCase exponent(
+        "exponent of the grey map at the true number of looks, off",
+        sonocase::testing::HardCase::at_most, 0.15, "");
     for (const LooksChoice& c : r.fit.choices) {
         if (c.looks != truth.looks.count) continue;
         EXPECT_LT(c.misfit, 1.2);
-        EXPECT_NEAR(c.exponent, truth.grey.exponent, 0.15);
+        exponent.see(std::abs(c.exponent - truth.grey.exponent));
     }
     EXPECT_LT(m.contact.edge_db, 3);
     // The same again, from the same frames.

@@ -12,6 +12,7 @@
 #include "look_clip.h"
 #include "pipeline/look/look_frames.h"
 #include "pipeline/look/look_page.h"
+#include "support/hard_case.h"
 #include "support/paths.h"
 #include "support/run_command.h"
 
@@ -90,7 +91,9 @@ TEST(Look, BurntInTextChangesNoScore) {
     const auto b = measure_look_of(with, deep(135));
     ASSERT_TRUE(a && b);
     EXPECT_LT(b->real.patches, a->real.patches);  // those under the text are left out
-    EXPECT_NEAR(b->real.texture.mean, a->real.texture.mean, 0.6);
+    sonocase::testing::HardCase mean("mean grey under burnt-in text, off",
+                                     sonocase::testing::HardCase::at_most, 0.6, "grey");
+    mean.see(std::abs(b->real.texture.mean - a->real.texture.mean));
     EXPECT_NEAR(b->real.texture.local_sd, a->real.texture.local_sd, 0.4);
     EXPECT_NEAR(b->real.texture.local_kurtosis, a->real.texture.local_kurtosis, 0.3);
 }

@@ -166,6 +166,17 @@ KnownCase known_case(int n, std::uint64_t seed = 1, Kind kind = Kind::calibrated
     return c;
 }
 
+// Root mean square over a structure.
+double error_mm(const KnownCase& c, const Registration& map, const std::string& label) {
+    const std::vector<Point3>& points = c.truth.patient->organs.at(label);
+    double sum = 0;
+    for (Point3 p : points) {
+        const Vector3 d = mannequin_from_ct(map, p) - c.truth(p);
+        sum += dot(d, d);
+    }
+    return std::sqrt(sum / static_cast<double>(points.size()));
+}
+
 struct Held {
     int turned = 0;  // cases that lie the other way round, which is said and not counted
     int structures = 0, median = 0, p90 = 0, p95 = 0, covariance90 = 0, refits90 = 0;
@@ -183,6 +194,14 @@ void count(int n,
     const Body& patient = *c.truth.patient;
     const auto fitted = register_surfaces({patient.skin, c.sweep, &patient.labels}, c.options);
     ASSERT_TRUE(fitted) << fitted.error().message();
+    if (std::getenv("SONOCASE_SHOW")) {
+        std::printf("case %d, score %.2f mm, coverage %.2f, of the skin %.2f\n", n,
+                    measure(*fitted, "pose_score_mm"), fitted->fit.coverage,
+                    fitted->fit.skin_coverage);
+        for (const RunnerUp& r : fitted->runners_up)
+            std::printf("  or %s, score %.2f mm, coverage %.2f\n", r.described.c_str(), r.score_mm,
+                        r.coverage);
+    }
     // What is said of places holds for the pose that was taken. Where a body has no front or no
     // head that its skin would show, the fit must say that.
     const Matrix3& truth = c.truth.quadratic.mannequin_from_ct.rotation;
@@ -193,24 +212,19 @@ void count(int n,
         };
         EXPECT_TRUE(
             std::any_of(fitted->report.notes.begin(), fitted->report.notes.end(), is_untold))
-            << "case " << n;
+            << "case " << n << ": head " << note(*fitted, "head") << "; front "
+            << note(*fitted, "front");
         return;
     }
     // Gaps go together where the true map is no quadratic.
     const double design_effect = measure(*fitted, "gap_design_effect");
     if (!c.truth.built) {
-        EXPECT_LT(design_effect, 2) << "case " << n;
+        EXPECT_LT(design_effect, 2.5) << "case " << n;  // of 60 known quadratics at most 2.01
     } else if (c.truth.build == Build::belly) {
         EXPECT_GT(design_effect, 2) << "case " << n;
     }
     for (const OrganUnknown& u : fitted->unknown) {
-        const std::vector<Point3>& points = patient.organs.at(u.label);
-        double sum = 0;
-        for (Point3 p : points) {
-            const Vector3 d = mannequin_from_ct(fitted->registration, p) - c.truth(p);
-            sum += dot(d, d);
-        }
-        const double error = std::sqrt(sum / static_cast<double>(points.size()));
+        const double error = error_mm(c, fitted->registration, u.label);
         ++held->structures;
         held->median += error <= u.median_mm;
         held->p90 += error <= u.p90_mm;
@@ -249,6 +263,30 @@ TEST(FitUnknown, APoseThatHasSlidOffItsReadingsIsNotTaken) {
     reached.see(measure(*aligned, "rigid_coverage"));
 }
 
+// The only fit that the search finds has slid along the body: its residuals are small, and what it
+// says of its error must not be.
+TEST(FitUnknown, AFitThatHasSlidOffItsReadingsKnowsHowFarTheyAre) {
+    const KnownCase c = known_case(33, 2, Kind::others);
+    const auto fitted =
+        register_surfaces({c.truth.patient->skin, c.sweep, &c.truth.patient->labels}, c.options);
+    ASSERT_TRUE(fitted) << fitted.error().message();
+    EXPECT_LT(fitted->fit.coverage, 0.5);
+    EXPECT_LT(fitted->fit.skin_coverage, 0.5);
+    HardCase slid("error of any structure over the 90 % said of it, slid off the readings",
+                  HardCase::at_most, 1, "");
+    for (const OrganUnknown& u : fitted->unknown)
+        slid.see(error_mm(c, fitted->registration, u.label) / u.p90_mm);
+}
+
+// A mannequin of another build, read all round, fits 11 % better with its front to the back.
+TEST(FitUnknown, AFrontThatFitsATenthBetterIsNotCalledRight) {
+    const KnownCase c = known_case(9, 2, Kind::others);
+    const auto aligned = align_surfaces({c.truth.patient->skin, c.sweep}, c.options);
+    ASSERT_TRUE(aligned);
+    EXPECT_TRUE(note(*aligned, "front").starts_with("not told by the skin"))
+        << note(*aligned, "front");
+}
+
 TEST(FitUnknown, TheLargerOfTwoWaysIsSaid) {
     KnownCase c = known_case(4);
     c.options.uncertainty = "on";
@@ -279,8 +317,10 @@ TEST(FitUnknown, TheLargerOfTwoWaysIsSaid) {
 void calibration(const char* uncertainty, Kind kind) {
     const char* given = std::getenv("SONOCASE_CALIBRATION_SEED");
     const std::uint64_t seed = given ? std::strtoull(given, nullptr, 10) : 1;
+    const char* one = std::getenv("SONOCASE_CALIBRATION_CASE");
     Held held;
-    for (int n = 0; n < 60; ++n) count(n, uncertainty, &held, seed, kind);
+    for (int n = 0; n < 60; ++n)
+        if (!one || n == std::atoi(one)) count(n, uncertainty, &held, seed, kind);
     const auto share = [&](int part) { return 100.0 * part / std::max(1, held.structures); };
     const auto median = [](std::vector<double> v) {
         if (v.empty()) return 0.0;
@@ -300,6 +340,8 @@ void calibration(const char* uncertainty, Kind kind) {
 
 // The measurements behind docs/numerics.md: run with --gtest_also_run_disabled_tests.
 // SONOCASE_CALIBRATION_SEED  another sixty maps and sweeps; 1 by default
+// SONOCASE_CALIBRATION_CASE  one of them alone
+// SONOCASE_SHOW=1            error of each structure, and what was said of it
 TEST(FitUnknown, DISABLED_CalibrationOfSixtyFits) {
     calibration("on", Kind::calibrated);
 }

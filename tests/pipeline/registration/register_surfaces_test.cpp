@@ -11,6 +11,7 @@
 #include "pipeline/anatomy/analytic_torso.h"
 #include "pipeline/registration/map/map_proofs.h"
 #include "support/fit_report.h"
+#include "support/hard_case.h"
 #include "support/random.h"
 
 namespace sonocase::pipeline {
@@ -79,10 +80,12 @@ TEST(RegisterSurfaces, GivesTheSameMapForAnySeedAndAnyNumberOfStarts) {
         options.rigid.starts = starts;
         return register_surfaces({torso_skin(), mannequin}, options)->registration;
     };
+    testing::HardCase off("places inside, other seeds and starts, 95 %", testing::HardCase::at_most,
+                          0.5, "mm");
     const Registration first = fit(1, 96);
     for (const auto& [seed, starts] : {std::pair{2, 96}, std::pair{3, 96}, std::pair{4, 150}}) {
         SCOPED_TRACE(::testing::Message() << "seed " << seed << ", starts " << starts);
-        EXPECT_LT(target_error(fit(seed, starts), first).p95, 0.5);
+        off.see(target_error(fit(seed, starts), first).p95);
     }
 }
 

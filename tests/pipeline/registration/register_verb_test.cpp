@@ -12,6 +12,7 @@
 #include "formats/text/number_text.h"
 #include "pipeline/import/mesh/surface_file.h"
 #include "pipeline/registration/map/registration.h"
+#include "support/hard_case.h"
 #include "support/paths.h"
 #include "support/random.h"
 #include "support/run_command.h"
@@ -157,6 +158,8 @@ TEST(MapVerb, AFifthOfTheTargetsWithoutPreimageAndPointsOnTheFoldAreMarked) {
     std::string line;
     std::getline(rows, line);
     EXPECT_EQ(line, "x,y,z,status");
+    testing::HardCase off("where a place with a preimage goes back to, off",
+                          testing::HardCase::at_most, 1e-6, "mm");
     int none = 0;
     for (const Point3 y : targets) {
         ASSERT_TRUE(std::getline(rows, line));
@@ -166,7 +169,7 @@ TEST(MapVerb, AFifthOfTheTargetsWithoutPreimageAndPointsOnTheFoldAreMarked) {
             none += y.x < -100;
         } else if (status == "ok") {
             const double x = std::stod(line);
-            EXPECT_NEAR(x * x / 250 - 100, y.x, 1e-6);
+            off.see(std::abs(x * x / 250 - 100 - y.x));
         } else {
             EXPECT_EQ(y.x, -100) << "only on the fold may a point with a preimage be refused";
         }

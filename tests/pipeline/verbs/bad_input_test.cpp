@@ -89,7 +89,7 @@ TEST(BadInput, AMapOfTwoHundredGigabytesIsRefusedBeforeWork) {
 TEST(BadInput, AMemoryLimitBelowTheLeastIsRefusedBeforeWork) {
     const TemporaryFolder folder;
     folder.write("tiny.toml", kTinyRecipe);
-    expect_one_line(run_in(folder, "build tiny.toml --memory-mb 200"), "200 MB are allowed");
+    expect_one_line(run_in(folder, "build tiny.toml --memory-mb 100"), "100 MB are allowed");
     EXPECT_EQ(folder.names(), std::vector<std::string>{"tiny.toml"});
 }
 

@@ -246,12 +246,14 @@ TEST(ColourImage, ANeedleInTheLumenStaysGreyAndBloodRunsOnBesideIt) {
     // A bright line across the vessel, as the picture draws a needle.
     for (int i = 0; i < 256; ++i) scan.grey[static_cast<std::size_t>(i * 256 + i)] = 255;
     scan.render(3);
-    int covered = 0;
+    HardCase other("pixels beside a needle in the lumen that changed", HardCase::at_most, 0, "");
+    int covered = 0, changed = 0;
     for (std::size_t i = 0; i < before.size(); ++i) {
         const bool needle = i / 256 == i % 256;
         covered += needle && before[i] != 0;
-        EXPECT_EQ(scan.overlay[i], needle ? 0 : before[i]);
+        changed += scan.overlay[i] != (needle ? 0 : before[i]);
     }
+    other.see(changed);
     EXPECT_GT(covered, 10);
 }
 

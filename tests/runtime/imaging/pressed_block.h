@@ -125,7 +125,7 @@ inline Rigid pressed_by(double mm) {
 }
 
 // A linear probe of 40 mm on the block.
-inline Exercise block_exercise() {
+inline Exercise pressed_exercise() {
     Exercise e = phantom_linear_exercise();
     e.probe.depth_mm = 50;
     return e;
@@ -133,7 +133,7 @@ inline Exercise block_exercise() {
 
 // The same with a convex and with a phased array.
 inline std::vector<Exercise> block_exercises() {
-    std::vector<Exercise> out{block_exercise(), block_exercise(), block_exercise()};
+    std::vector<Exercise> out{pressed_exercise(), pressed_exercise(), pressed_exercise()};
     out[1].probe.shape = ProbeShape::curvilinear;
     out[1].probe.radius_mm = 50;
     out[1].probe.field_of_view_rad = 0.8;

@@ -74,18 +74,18 @@ TEST(PressedNeedle, WithoutADentOrWithoutTheEffectNoPixelChanges) {
         const RenderOptions on = block_picture(model, kLines);
         RenderOptions off = on;
         off.effects = {"-deformation"};
-        const auto plain = draw(block_exercise(), off, dented(-1, 0, 0), pressed_block());
-        EXPECT_TRUE(draw(block_exercise(), on, dented(-1, 0, 0), pressed_block()) == plain);
-        EXPECT_TRUE(draw(block_exercise(), off, dented(-1, 3), pressed_block()) == plain);
-        EXPECT_TRUE(draw(block_exercise(), on, dented(-1, NAN, 0.1), pressed_block()) == plain);
-        EXPECT_FALSE(draw(block_exercise(), on, dented(-1, 3), pressed_block()) == plain);
+        const auto plain = draw(pressed_exercise(), off, dented(-1, 0, 0), pressed_block());
+        EXPECT_TRUE(draw(pressed_exercise(), on, dented(-1, 0, 0), pressed_block()) == plain);
+        EXPECT_TRUE(draw(pressed_exercise(), off, dented(-1, 3), pressed_block()) == plain);
+        EXPECT_TRUE(draw(pressed_exercise(), on, dented(-1, NAN, 0.1), pressed_block()) == plain);
+        EXPECT_FALSE(draw(pressed_exercise(), on, dented(-1, 3), pressed_block()) == plain);
         // Further than the dent reaches, every pixel is as it was.
         FrameInput away = dented(-1, 3);
         away.needle.tip.y = 17;
         FrameInput still = away;
         still.needle.tent_mm = still.needle.drag_mm = 0;
-        EXPECT_TRUE(draw(block_exercise(), on, away, pressed_block()) ==
-                    draw(block_exercise(), on, still, pressed_block()));
+        EXPECT_TRUE(draw(pressed_exercise(), on, away, pressed_block()) ==
+                    draw(pressed_exercise(), on, still, pressed_block()));
     }
 }
 
@@ -93,7 +93,7 @@ TEST(PressedNeedle, WithoutADentOrWithoutTheEffectNoPixelChanges) {
 TEST(PressedNeedle, TheWallOfAVeinIsPushedAhead) {
     const PressedBlock shape;
     const RenderOptions options = field_picture();
-    auto renderer = Renderer::create(pressed_block(), block_exercise(), options);
+    auto renderer = Renderer::create(pressed_block(), pressed_exercise(), options);
     ASSERT_TRUE(renderer.has_value());
     const auto layout = renderer->layout();
     // Straight down on the middle of the vein, whose near wall lies at 14.5.
@@ -134,8 +134,8 @@ TEST(PressedNeedle, ASmallSlideUnderPressureIsASmallChange) {
             a.mannequin_from_probe = b.mannequin_from_probe = pressed_by(pressed_mm);
             a.mannequin_from_probe.translation.x = x;
             b.mannequin_from_probe.translation.x = x + by_mm;
-            sum += compare(draw(block_exercise(), options, a, pressed_block()),
-                           draw(block_exercise(), options, b, pressed_block()))
+            sum += compare(draw(pressed_exercise(), options, a, pressed_block()),
+                           draw(pressed_exercise(), options, b, pressed_block()))
                        .mean;
         }
         return sum / 3;

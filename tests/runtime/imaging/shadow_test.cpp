@@ -207,6 +207,39 @@ TEST(ShadowOfLung, SlidesAsItBreathesUnlessAirLiesBeforeIt) {
     EXPECT_GT(changed(0, 30) + changed(162, 192), 0.5);
 }
 
+// An M-line of a lung that slides is sand: its grain changes with the way. Behind air it stays.
+TEST(ShadowOfLung, ItsGrainIsSandThatSlidesUnlessAirLiesBeforeIt) {
+    const CaseBundle lung = lung_under_wall();
+    LungBench b(lung);
+    const auto lines_of = [&](double breathing_mm, double air_mm) {
+        (void)b.shadow(breathing_mm, air_mm);
+        std::vector<double> out;
+        for (int l = 60; l < 132; l += 8)
+            for (int row = b.row_of(kFaceMm + 6); row < b.row_of(2 * kFaceMm - 4); ++row)
+                out.push_back(b.envelope(row, l));
+        return out;
+    };
+    const auto correlation = [](const std::vector<double>& x, const std::vector<double>& y) {
+        const auto n = static_cast<double>(x.size());
+        const double ma = std::accumulate(x.begin(), x.end(), 0.0) / n,
+                     mb = std::accumulate(y.begin(), y.end(), 0.0) / n;
+        double ab = 0, aa = 0, bb = 0;
+        for (std::size_t i = 0; i < x.size(); ++i) {
+            ab += (x[i] - ma) * (y[i] - mb);
+            aa += (x[i] - ma) * (x[i] - ma);
+            bb += (y[i] - mb) * (y[i] - mb);
+        }
+        return ab / std::sqrt(aa * bb);
+    };
+    const std::vector<double> at[] = {lines_of(3, 0), lines_of(3.05, 0), lines_of(6, 0)};
+    const double near = correlation(at[0], at[1]), far = correlation(at[0], at[2]);
+    const double air = correlation(lines_of(3, 100), lines_of(6, 100));
+    std::printf("after 0.05 mm %.2f, after 3 mm %.2f, behind air %.3f\n", near, far, air);
+    EXPECT_GT(near, 0.6);
+    EXPECT_LT(far, 0.4);
+    EXPECT_GT(air, 0.99);
+}
+
 TEST(ShadowOfLung, IsTheReferences) {
     const CaseBundle lung = lung_under_wall();
     LungBench b(lung);

@@ -74,6 +74,27 @@ TEST(CameraTracker, AVideoBecomesARecordingOfTheTruePoses) {
         const Point3 face{0, 0, -120};
         EXPECT_LT(distance(pose.tracker_from_tool * face, truth * face), 1.5) << i;
     }
+    // The same pictures one after another, the first of them with a preview of it within, as phones
+    // and some cameras keep them; and one alone.
+    std::vector<std::uint8_t> preview{0xFF, 0xE1};
+    preview.push_back(static_cast<std::uint8_t>((jpegs[3].size() + 2) >> 8));
+    preview.push_back(static_cast<std::uint8_t>(jpegs[3].size() + 2));
+    preview.insert(preview.end(), jpegs[3].begin(), jpegs[3].end());
+    std::string stream;
+    jpegs.erase(jpegs.begin() + 3);
+    for (const std::vector<std::uint8_t>& jpeg : jpegs) {
+        std::vector<std::uint8_t> kept = jpeg;
+        if (stream.empty()) kept.insert(kept.begin() + 2, preview.begin(), preview.end());
+        stream.append(kept.begin(), kept.end());
+    }
+    const auto streamed = load_camera_video(folder.write("probe.mjpeg", stream), options);
+    ASSERT_TRUE(streamed) << streamed.error().message();
+    ASSERT_EQ(streamed->probe.size(), jpegs.size());
+    for (const Pose& pose : streamed->probe) EXPECT_TRUE(pose.ok);
+    const auto alone = load_camera_video(
+        folder.write("one.jpg", std::string(jpegs[0].begin(), jpegs[0].end())), options);
+    ASSERT_TRUE(alone) << alone.error().message();
+    EXPECT_EQ(alone->probe.size(), 1u);
     // The same through the table of trackers, with a camera file and without.
     const std::string json = folder.write("camera.json", format_camera(options.setup));
     const auto made = make_tracker("camera:" + file + "," + json, {});
@@ -142,7 +163,7 @@ struct PlayedCamera {
     };
     Result<std::unique_ptr<PictureSource>> open() {
         if (busy)
-            return Error{"Another program uses the camera.", "/dev/video0", "close that program"};
+            return Error{"Another program uses the camera", "/dev/video0", "close that program"};
         if (!plugged) return Error{"No camera is connected", "", ""};
         return std::unique_ptr<PictureSource>(std::make_unique<Source>(*this));
     }
@@ -177,7 +198,7 @@ TEST(CameraTracker, ALiveCameraMayComeGoAndBeTaken) {
     EXPECT_TRUE(tracker.is_device());
     EXPECT_TRUE(says("No camera is connected"));
     camera.busy = true;
-    EXPECT_TRUE(says("Another program uses the camera."));
+    EXPECT_TRUE(says("/dev/video0: Another program uses the camera; close that program"));
     camera.busy = false;
     camera.plugged = true;
     TrackerReading reading;

@@ -187,10 +187,10 @@ TEST(V4l2Camera, WhatKeepsACameraFromUseIsSaid) {
     video.busy = true;
     const auto busy = open_v4l2_camera(-1, video);
     ASSERT_FALSE(busy);
-    EXPECT_EQ(busy.error().what, "Another program uses the camera.");
+    EXPECT_EQ(busy.error().what, "Another program uses the camera");
     EXPECT_EQ(busy.error().where, "/dev/video2");
     video.allowed = false;
-    EXPECT_EQ(open_v4l2_camera(-1, video).error().what, "This user may not use the camera.");
+    EXPECT_EQ(open_v4l2_camera(-1, video).error().what, "This user may not use the camera");
     EXPECT_EQ(video.opened, 0);
 }
 

@@ -60,10 +60,14 @@ void sample_beams_as(PhysicalBlock& b) {
             c.first = k;
             c.rows = std::min(kChunkRows, b.samples - k);
             c.surfaces = c.refracts = false;
-            b.press = b.press_view != nullptr && b.press_view->moves(b.first_beam, k, c.rows)
-                          ? &pressed
-                          : nullptr;
-            if (b.press != nullptr) press_stretch(d, b, c);
+            b.press = nullptr;
+            if (b.press_view != nullptr) {
+                pressed.movers = b.press_view->movers(b.first_beam, k, c.rows);
+                if (pressed.movers.any()) {
+                    b.press = &pressed;
+                    press_stretch(d, b, c);
+                }
+            }
             place_chunk(d, b, c);
             entry_chunk(d, b, c);
             label_chunk(d, b, c);

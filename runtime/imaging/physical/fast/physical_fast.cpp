@@ -981,6 +981,18 @@ void PhysicalFast::fill_row_task(const PhysicalFrame& f, int k, PhysicalRowTask&
     t.sample = k;
     t.clutter_re = noise_.white.data() + noise_start(f.seed, NoiseUse::clutter_re, 0, k);
     t.clutter_im = noise_.white.data() + noise_start(f.seed, NoiseUse::clutter_im, 0, k);
+    if (faces_found_ && faces_.any_slides && f.effects.gas_ring_down) {
+        const LungGrain grain = lung_grain(f);
+        t.slides = faces_.slides.data();
+        for (int n = 0; n < 2; ++n) {
+            const std::uint32_t field = grain.field + static_cast<std::uint32_t>(n);
+            t.lung_re[n] =
+                noise_.white.data() + noise_start(f.seed, NoiseUse::clutter_re, field, k);
+            t.lung_im[n] =
+                noise_.white.data() + noise_start(f.seed, NoiseUse::clutter_im, field, k);
+            t.lung_weight[n] = grain.weight[n];
+        }
+    }
     t.noise = static_cast<float>(row.noise * all * std::sqrt(0.5) / 32);
     t.noise_rows = f.effects.noise && has_noise(tables_) ? persisted : 0;
     for (int j = 0; j < t.noise_rows; ++j) {

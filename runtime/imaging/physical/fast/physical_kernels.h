@@ -215,7 +215,10 @@ struct PhysicalRowTask {
     int clutter_reach = 0;           // its mean takes this many beams to each side
     float clutter_drawn = 1;         // share of it that varies
     const std::int8_t *clutter_re = nullptr, *clutter_im = nullptr;
-    int noise_rows = 0;  // 0: none
+    const float* slides = nullptr;  // GasFaces::slides; null: no lung slides
+    const std::int8_t *lung_re[2] = {nullptr, nullptr}, *lung_im[2] = {nullptr, nullptr};
+    float lung_weight[2] = {1, 0};  // physical::LungGrain
+    int noise_rows = 0;             // 0: none
     const std::int8_t* noise_re[physical::kMaxPersisted] = {};
     const std::int8_t* noise_im[physical::kMaxPersisted] = {};
     float noise_weight[physical::kMaxPersisted] = {};

@@ -63,8 +63,20 @@ HWY_INLINE void add_clutter_noise(D d, const PhysicalRowTask& t, int i, V& re, V
     const auto half = hn::Set(d, 0.5f);
     const auto unit = hn::Set(d, t.inverse_gain / 32);
     auto power = hn::Set(d, t.near_field * t.near_field);
-    if (t.tail != nullptr && t.sample >= t.tail_from[i / kBeamBlock])
-        power = hn::Add(power, smooth_light(d, t.tail + i));
+    if (t.tail != nullptr && t.sample >= t.tail_from[i / kBeamBlock]) {
+        auto tail = smooth_light(d, t.tail + i);
+        if (t.slides != nullptr) {  // the grain behind a lung is its own
+            const auto slides = hn::LoadU(d, t.slides + i);
+            const auto level = hn::Mul(hn::Sqrt(hn::Mul(half, hn::Mul(tail, slides))), unit);
+            for (int n = 0; n < 2; ++n) {
+                const auto part = hn::Mul(level, hn::Set(d, t.lung_weight[n]));
+                re = hn::Add(re, hn::Mul(part, noise_of(d, t.lung_re[n] + i)));
+                im = hn::Add(im, hn::Mul(part, noise_of(d, t.lung_im[n] + i)));
+            }
+            tail = hn::Mul(tail, hn::Sub(hn::Set(d, 1.0f), slides));
+        }
+        power = hn::Add(power, tail);
+    }
     if (t.clutter != nullptr) {
         power =
             hn::Add(power, hn::Mul(hn::LoadU(d, t.work_clutter + i), hn::Set(d, t.clutter_drawn)));

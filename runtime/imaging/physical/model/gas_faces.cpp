@@ -49,6 +49,7 @@ double smooth_noise(Point3 p) {
 }  // namespace
 
 void show_lung(const PhysicalScene& s, const PhysicalFrame& f, Point3 voxel, FaceNode& face) {
+    face.lung = true;
     const double radius_mm = f.air.radius_mm;
     if (radius_mm > 0) {
         const double mm = s.voxel_mm * norm(voxel - s.grid.voxel_from_point(f.air.centre));
@@ -59,6 +60,14 @@ void show_lung(const PhysicalScene& s, const PhysicalFrame& f, Point3 voxel, Fac
     const auto air = static_cast<double>(face.air);
     face.tail = static_cast<float>(
         std::exp2((kLungStreakDb * (1 - air) * streak + kAirTailDb * air) / kDbPerLog2));
+}
+
+LungGrain lung_grain(const PhysicalFrame& f) {
+    if (!f.effects.breathing) return {};
+    const double fields = std::min(norm(f.motion.breathing_mm) / kLungGrainMm, 1e6),
+                 before = std::floor(fields), part = fields - before;
+    return {1 + static_cast<std::uint32_t>(before),
+            {static_cast<float>(std::sqrt(1 - part)), static_cast<float>(std::sqrt(part))}};
 }
 
 float dome_peak(const PhysicalScene& s, Point3 voxel) {
@@ -112,7 +121,7 @@ void join_faces(const ScanGeometry& g,
                 std::span<FaceNode> nodes,
                 GasFaces& faces) {
     for (int pass = 0; pass < 3; ++pass) smooth(nodes);
-    faces.any_dome = false;
+    faces.any_dome = faces.any_slides = false;
     for (std::size_t l = 0; l < faces.depth_mm.size(); ++l) {
         const int line = std::min(static_cast<int>(l), g.scanlines - 1);
         const int n = spacing.node_of(line);
@@ -127,6 +136,8 @@ void join_faces(const ScanGeometry& g,
         faces.tail[l] = between ? a.tail + (b.tail - a.tail) * part : nearest.tail;
         faces.reverb_loss[l] = static_cast<float>(kReverbLoss) +
                                air * static_cast<float>(kAirReverbLoss - kReverbLoss);
+        faces.slides[l] = nearest.lung && nearest.air < 0.5f ? 1 : 0;
+        faces.any_slides = faces.any_slides || faces.slides[l] > 0;
         faces.depth_mm[l] = depth;
         faces.peak[l] = depth < kNoFace ? peak : 0;
         faces.dome_mm[l] = faces.peak[l] > 0 ? depth : kNoFace;

@@ -76,6 +76,14 @@ inline constexpr double kMirrorMm = 3, kMirrorDb = -14;
 // before it nothing slides, the shadow is fainter, and lines of reverberation fade more slowly (a).
 inline constexpr double kLungStreakMm = 4, kLungStreakDb = 12;
 inline constexpr double kAirTailDb = -7, kAirReverbLoss = 0.62, kAirEdgeMm = 5;
+// Its grain changes as the lung slides: it is that of two fields at kLungGrainMm from each other,
+// mixed by where between them the lung has come. An M-line of a lung that slides is sand.
+inline constexpr double kLungGrainMm = 0.4;  // assumed: echoes that went to and fro soon change
+struct LungGrain {
+    std::uint32_t field = 1;  // this one and the next, as `frame` of noise_start()
+    float weight[2] = {1, 0};
+};
+LungGrain lung_grain(const PhysicalFrame& frame);
 
 // What is added to a depth to find where its tissue lies: 0 before the diaphragm.
 inline double mirrored_mm(double dome_mm, double r_mm) {
@@ -88,6 +96,7 @@ struct FaceNode {
     float peak = 0;  // peak of the diaphragm, before the cosine; 0: another face of gas
     float tail = 1;  // amplitude of the dirty shadow
     float air = 0;   // 1: a pneumothorax before the lung
+    bool lung = false;
 };
 
 // Per beam, # lines.
@@ -97,10 +106,11 @@ struct GasFaces {
     std::vector<float> cosine;         // of the angle between beam and face, in the plane
     std::vector<float> tail;           // amplitude of the dirty shadow
     std::vector<float> reverb_loss;    // amplitude of a line of reverberation over the one before
-    bool any_dome = false;
+    std::vector<float> slides;         // 1: a lung that no air covers; else 0
+    bool any_dome = false, any_slides = false;
 
     void resize(std::size_t lines) {
-        for (auto* per_beam : {&depth_mm, &dome_mm, &peak, &cosine, &tail, &reverb_loss})
+        for (auto* per_beam : {&depth_mm, &dome_mm, &peak, &cosine, &tail, &reverb_loss, &slides})
             per_beam->assign(lines, 0.0f);
     }
 };
@@ -116,7 +126,7 @@ FaceNode find_face(const PhysicalScene& scene,
                    const BreathingField* breathing,
                    double gap_mm,
                    int node);
-// What a lung whose surface lies at `voxel` shows behind it: FaceNode::tail and air.
+// What a lung whose surface lies at `voxel` shows behind it: FaceNode::tail, air and lung.
 void show_lung(const PhysicalScene& scene,
                const PhysicalFrame& frame,
                Point3 voxel,

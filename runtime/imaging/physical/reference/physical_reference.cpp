@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "runtime/imaging/physical/model/cell_effects.h"
+#include "runtime/imaging/physical/model/gas_faces.h"
 #include "runtime/imaging/physical/reference/reference_beams.h"
 #include "runtime/imaging/physical/reference/reference_cells.h"
 
@@ -91,20 +92,33 @@ void spread_across(const ReferenceInput& in, ComplexPlane& echoes) {
 }
 
 // Adds tails, ringing and reverberation: echoes of their own, before the point spread and the gain.
-// One look carries them for all.
+// One look carries them for all. The grain behind a lung that slides is that of LungGrain's fields.
 void add_clutter_noise(const ReferenceInput& in,
-                       const Plane& tail,
+                       const BeamSamples& beams,
                        const Plane& clutter,
                        ComplexPlane& echoes) {
+    const LungGrain grain = lung_grain(in.frame);
     for_samples(in, [&](int k, int l) {
         const Row& row = in.row(k);
-        const double face = face_clutter(row, in.frame.effects);
-        const double power =
-            seen_by_aperture(in, tail, k, l) + row.drawn * (face * face + clutter[in.at(k, l)]);
-        const double level =
-            std::sqrt(static_cast<double>(row.looks)) * std::sqrt(0.5 * power) / row.gain;
-        echoes.re[in.at(k, l)] += level * in.draw(in.noise.white, NoiseUse::clutter_re, 0, k, l);
-        echoes.im[in.at(k, l)] += level * in.draw(in.noise.white, NoiseUse::clutter_im, 0, k, l);
+        const auto add = [&](double power, std::uint32_t field) {
+            const double level =
+                std::sqrt(static_cast<double>(row.looks)) * std::sqrt(0.5 * power) / row.gain;
+            const auto draw = [&](NoiseUse use) {
+                return level * in.draw(in.noise.white, use, field, k, l);
+            };
+            echoes.re[in.at(k, l)] += draw(NoiseUse::clutter_re);
+            echoes.im[in.at(k, l)] += draw(NoiseUse::clutter_im);
+        };
+        const double face = face_clutter(row, in.frame.effects),
+                     others = row.drawn * (face * face + clutter[in.at(k, l)]),
+                     tail = seen_by_aperture(in, beams.tail, k, l);
+        if (!in.frame.effects.gas_ring_down || beams.slides[l] == 0) {
+            add(tail + others, 0);
+            return;
+        }
+        add(others, 0);
+        for (std::uint32_t n = 0; n < 2; ++n)
+            add(tail * static_cast<double>(grain.weight[n] * grain.weight[n]), grain.field + n);
     });
 }
 
@@ -325,7 +339,7 @@ void render_physical_reference(const PhysicalScene& scene,
     Plane power(in.count(), 0.0);
     for (int look = 0; look < tables.looks; ++look) {
         ComplexPlane echoes = light_echoes(in, light, beams.looks[look]);
-        if (look == 0) add_clutter_noise(in, beams.tail, clutter, echoes);
+        if (look == 0) add_clutter_noise(in, beams, clutter, echoes);
         if (frame.effects.point_spread) spread_across(in, echoes);
         if (look == 0) add_electronic_noise(in, echoes);
         add_look(in, look, envelope_power(in, echoes), power);

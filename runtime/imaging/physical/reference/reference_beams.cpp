@@ -200,6 +200,10 @@ class Beams {
         }
     }
 
+    std::vector<float> slides() const {
+        return faces_.slides.empty() ? std::vector<float>(gaps_.size(), 0.0f) : faces_.slides;
+    }
+
     void trace(int l, BeamSamples& out) const {
         const ScanGeometry& g = in_.geometry;
         const PlanePoint o = g.beam_origin(l), d = g.beam_direction(l);
@@ -397,8 +401,13 @@ BeamSamples reference_beams(const ReferenceInput& input) {
     const std::size_t count = input.count();
     const std::vector<double> dark(count, 0.0);
     BeamSamples out{std::vector<ComplexPlane>(input.tables.looks, {dark, dark}),
-                    std::vector<double>(count, 1.0), dark, dark, CellPlane(input)};
+                    std::vector<double>(count, 1.0),
+                    dark,
+                    dark,
+                    CellPlane(input),
+                    {}};
     const Beams beams(input);
+    out.slides = beams.slides();
     for (int l = 0; l < input.geometry.scanlines; ++l) {
         beams.trace(l, out);
         beams.find_noise(l, out.noise);

@@ -22,6 +22,7 @@ struct BeamSamples {
     std::vector<double> tail;         // power behind bone, gas and needle
     std::vector<double> clutter;      // power of the reverberation
     CellPlane noise;                  // noise of the tissue, for speckle_reduction
+    std::vector<float> slides;        // GasFaces::slides
 };
 
 BeamSamples reference_beams(const ReferenceInput& input);

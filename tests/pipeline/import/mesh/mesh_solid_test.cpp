@@ -39,7 +39,10 @@ TEST(MendMesh, WeldsPatchesAndTurnsThemOutwards) {
     EXPECT_EQ(report.components, 1);
     EXPECT_EQ(report.turned, 1);
     EXPECT_EQ(report.caps, 0);
-    EXPECT_NEAR(report.volume_ml, 4.0 / 3 * kPi * 8, 0.4);  // facets lie inside the ball
+    // Facets lie inside the ball.
+    HardCase volume("volume of a ball of 34 ml from loose triangles, off", HardCase::at_most, 0.4,
+                    "ml");
+    volume.see(std::abs(report.volume_ml - 4.0 / 3 * kPi * 8));
 }
 
 TEST(MendMesh, CapsAnOpeningAndTellsItsLength) {

@@ -30,14 +30,6 @@ namespace {
 
 using namespace sonocase::testing;
 
-std::string note(const RegisterResult& r, const std::string& name) {
-    for (const Note& n : r.report.notes) {
-        if (n.name == name) return n.text;
-    }
-    ADD_FAILURE() << name;
-    return "";
-}
-
 RegisterOptions hints(const BuiltMannequin& mannequin) {
     RegisterOptions options;
     options.up = mannequin.head;
@@ -258,23 +250,6 @@ TEST(SharedPair, KeepsTheResidualWarpAndTheElasticOneIsCloser) {
     EXPECT_GT(measure(*elastic, "least_minor"), 0);
 }
 
-// For a hidden quadratic the residual warp is kept, even where it changes organs by more than a
-// body of another build would.
-TEST(SharedPair, AKnownQuadraticIsNotTakenForAnotherBuild) {
-    if (!shared_labels()) GTEST_SKIP() << "no " SONOCASE_DATA;
-    const LabelVolume& labels = shared_labels()->labels;
-    const auto skin = extract_skin_surface(labels);
-    ASSERT_TRUE(skin);
-    for (const std::uint64_t seed : {2, 4}) {
-        Random random(seed);
-        const Registration truth = random_quadratic_map(skin->box, skin->skin, random, 9);
-        const Surface sweep = sweep_of(skin->skin, truth, random);
-        const auto kept = register_surfaces({*skin, sweep, &labels});
-        ASSERT_TRUE(kept);
-        EXPECT_NE(note(*kept, "path"), "elastic") << note(*kept, "path_reason");
-    }
-}
-
 // 95th percentile of how far apart two maps carry places inside the body.
 double apart_mm(const LabelVolume& labels, const Registration& a, const Registration& b) {
     std::vector<double> off;
@@ -288,6 +263,25 @@ double apart_mm(const LabelVolume& labels, const Registration& a, const Registra
     }
     std::sort(off.begin(), off.end());
     return off[off.size() * 95 / 100];
+}
+
+// For a hidden quadratic the residual warp is kept, even where it changes organs by more than a
+// body of another build would.
+TEST(SharedPair, AKnownQuadraticIsNotTakenForAnotherBuild) {
+    if (!shared_labels()) GTEST_SKIP() << "no " SONOCASE_DATA;
+    const LabelVolume& labels = shared_labels()->labels;
+    const auto skin = extract_skin_surface(labels);
+    ASSERT_TRUE(skin);
+    HardCase off("interior of a known quadratic, off, 95 %", HardCase::at_most, 3, "mm");
+    for (const std::uint64_t seed : {2, 4}) {
+        Random random(seed);
+        const Registration truth = random_quadratic_map(skin->box, skin->skin, random, 9);
+        const Surface sweep = sweep_of(skin->skin, truth, random);
+        const auto kept = register_surfaces({*skin, sweep, &labels});
+        ASSERT_TRUE(kept);
+        EXPECT_NE(note(*kept, "path"), "elastic") << note(*kept, "path_reason");
+        off.see(apart_mm(labels, kept->registration, truth));
+    }
 }
 
 // What a case teaches must not depend on chance: on a seed, or on where the search begins. One
@@ -327,8 +321,13 @@ TEST_P(AnySeed, GivesTheSameMap) {
     const Registration first = fit(1, 96);
     const char* given = std::getenv("SONOCASE_SEEDS");
     const int seeds = given ? std::atoi(given) : 2;
-    // Other starts come to rest elsewhere in the same basin: 0.51 mm apart on the belly.
-    EXPECT_LE(apart_mm(patient->labels, fit(1, 102), first), 0.7);
+    const std::vector<int> all_starts = given ? std::vector{102, 130, 150, 192} : std::vector{102};
+    for (const int starts : all_starts) {
+        const double off = apart_mm(patient->labels, fit(1, starts), first);
+        // Other starts come to rest elsewhere in the same basin: 0.51 mm apart on the belly.
+        EXPECT_LE(off, 0.7) << starts << " starts";
+        if (given) std::printf("%s, %d starts: %.3f mm\n", which.c_str(), starts, off);
+    }
     for (int seed = 2; seed <= seeds; ++seed) {
         const double off =
             apart_mm(patient->labels, fit(static_cast<std::uint64_t>(seed), 96), first);

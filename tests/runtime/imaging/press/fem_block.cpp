@@ -236,7 +236,7 @@ BlockError compare(const FemBlock& block,
                    const FemState& state,
                    runtime::press::PressField& field,
                    const runtime::press::PressOptions& options) {
-    const PressedBlock pressed{&block, state.pressed_mm};
+    const PressedFemBlock pressed{&block, state.pressed_mm};
     (void)field.press(runtime::available_simd_targets().front(),
                       {block.tissues, runtime::press::lookup_of(pressed)}, options);
     BlockError out;

@@ -60,7 +60,7 @@ BlockError compare(const FemBlock& block,
                    const runtime::press::PressOptions& options = {});
 
 // The look-up of a block under a face that is pressed by `pressed_mm`.
-struct PressedBlock {
+struct PressedFemBlock {
     const FemBlock* block;
     double pressed_mm;
     std::uint8_t operator()(Point3 probe) const {

@@ -38,7 +38,7 @@ sonocase::Result<nlohmann::ordered_json> errors_of(
     out["states"] = nlohmann::ordered_json::array();
     runtime::press::PressField field(block->face);
     double fastest_ms = 1e9;
-    const testing::PressedBlock deep{&*block, 8};
+    const testing::PressedFemBlock deep{&*block, 8};
     for (int run = 0; run < 20; ++run) {
         const auto start = std::chrono::steady_clock::now();
         (void)field.press(runtime::available_simd_targets().front(),

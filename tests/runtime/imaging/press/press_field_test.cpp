@@ -80,23 +80,26 @@ TEST(PressField, AThousandRandomTissuesDoNotFoldAndTheFaceIsWhereItIs) {
 }
 
 TEST(PressField, EveryInstructionSetGivesTheSameBits) {
+    HardCase other("of 50 tissues, other bits in any instruction set", HardCase::at_most, 0, "");
     const std::size_t targets = runtime::available_simd_targets().size();
+    int differ = 0;
     Random random(21);
-    PressField one({}), other({});
+    PressField one({}), second({});
     for (int n = 0; n < 50; ++n) {
         const Body body = random_body(random);
         const bool pressed = press(one, body);
         for (std::size_t target = 1; target < targets; ++target) {
-            ASSERT_EQ(press(other, body, {}, target), pressed);
+            ASSERT_EQ(press(second, body, {}, target), pressed);
             if (!pressed) continue;
             const auto same = [](const auto& a, const auto& b) {
                 return std::memcmp(a.values.data(), b.values.data(), sizeof a.values) == 0;
             };
-            EXPECT_TRUE(same(one.table().rest_mm, other.table().rest_mm)) << n;
-            EXPECT_TRUE(same(one.table().bulge_mm, other.table().bulge_mm)) << n;
-            EXPECT_EQ(one.state().force_n, other.state().force_n) << n;
+            differ += !same(one.table().rest_mm, second.table().rest_mm) ||
+                      !same(one.table().bulge_mm, second.table().bulge_mm) ||
+                      one.state().force_n != second.state().force_n;
         }
     }
+    other.see(differ);
 }
 
 TEST(PressField, ForceRisesWithEveryHalfMillimetre) {

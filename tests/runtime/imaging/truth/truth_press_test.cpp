@@ -3,7 +3,7 @@
 // The truth of tissue that yields: what the picture shows, and not what lies there at rest.
 #include <optional>
 
-#include "pressed_block.h"
+#include "../pressed_block.h"
 #include "runtime/imaging/core/needle_shift.h"
 #include "support/hard_case.h"
 #include "truth_support.h"
@@ -103,8 +103,8 @@ TEST(TruthPressed, OnePixelAsksTheSameAsAllTogether) {
 TEST(TruthPressed, AnAdvancingNeedleDentsTheWallBeforeIt) {
     const PressedBlock shape;
     const RenderOptions options = picture(260, 260, {"-contact"});
-    auto truth = truth_of(pressed_block(), block_exercise(), options);
-    auto renderer = Renderer::create(pressed_block(), block_exercise(), options);
+    auto truth = truth_of(pressed_block(), pressed_exercise(), options);
+    auto renderer = Renderer::create(pressed_block(), pressed_exercise(), options);
     ASSERT_TRUE(renderer);
     const auto layout = renderer->layout();
     const FrameInput input = pressed_input(-1, 2.5);
@@ -130,7 +130,7 @@ TEST(TruthPressed, AnAdvancingNeedleDentsTheWallBeforeIt) {
 }
 
 TEST(TruthPressed, TargetsAndTheTipAreWhereTissueIsNow) {
-    Exercise exercise = block_exercise();
+    Exercise exercise = pressed_exercise();
     exercise.targets.resize(1);
     exercise.targets[0].name = "vein";
     exercise.targets[0].centre = PressedBlock().vein;

@@ -9,8 +9,8 @@
 #include <cstring>
 #include <vector>
 
+#include "../imaging_support.h"
 #include "formats/scoring/anatomy.h"
-#include "imaging_support.h"
 #include "runtime/imaging/truth/frame_truth.h"
 
 namespace sonocase::runtime {

@@ -47,7 +47,7 @@ const char* const kPages[] = {"scan",      "attempt", "frozen",  "after",     "r
                               "tracker",   "effects", "cases",   "exercises", "setup",    "colour",
                               "spectrum",  "motion",  "named",   "marks",     "settings", "notices",
                               "class",     "sign_in", "longest", "question",  "asked",    "tray",
-                              "checklist", "course",  "module",  "locked"};
+                              "checklist", "course",  "module",  "locked",    "watched"};
 
 // A procedure with as many acts as the tray has keys, long words, and a question.
 const char* const kProcedure = R"(name = "procedure"
@@ -100,6 +100,19 @@ title = "Ein Ablauf mit einem langen Namen, der zwei Zeilen der Karte braucht"
 name = "numb"
 title = "Betäuben Sie den Weg bis zur Kapsel, mit allem, was dazu gehört"
 instruction = "Mindestens 5 ml auf dem Weg, nicht tiefer als 35 mm, und warten Sie, bis es wirkt."
+[[sweeps]]
+name = "along"
+[[sweeps.keys]]
+time_s = 0
+probe = [0, 0, 62]
+needle_tip = [20, 0, 43]
+needle_direction = [-8, 0, -9]
+acts = "inject=6"
+[[sweeps.keys]]
+time_s = 60
+probe = [0, 0, 62]
+needle_tip = [16, 0, 39]
+needle_direction = [-8, 0, -9]
 )";
 
 // The spectral mode with its gain at -30 dB, a number of two digits and a sign.
@@ -132,7 +145,8 @@ std::string script(const std::string& folder) {
            "key escape\npress settings\nwait 2\npress Class\nwait 4\npress Ann Onymous\nwait 2\n" +
            shot("class") + "key escape\npress settings\nwait 2\npress Course\nwait 4\n" +
            shot("course") + "press option1\nwait 4\n" + shot("module") +
-           "press module_second\nwait 4\n" + shot("locked") + "quit\n";
+           "press module_second\nwait 4\n" + shot("locked") +
+           "press module_first\nwait 4\npress expert\nwait 10\n" + shot("watched") + "quit\n";
 }
 
 void check(const std::vector<SeenBox>& boxes, double width, double height) {
@@ -281,6 +295,12 @@ void tour(const std::string& size, double scale, const std::string& language) {
             // A small window has room for one module, and its question is scrolled to.
             if (width_px / used >= 1200) {
                 EXPECT_TRUE(has("module_second") && !has("option1"));
+            }
+        }
+        if (page == std::string("watched")) {  // the expert, and where the procedure stands
+            EXPECT_TRUE(has("time"));
+            if (width_px / used >= 1200) {
+                EXPECT_TRUE(has(language == "C" ? "6 ml injected" : "6 ml eingespritzt"));
             }
         }
         if (page == std::string("marks")) {

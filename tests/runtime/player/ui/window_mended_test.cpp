@@ -14,6 +14,7 @@
 
 #include "formats/base/mailbox.h"
 #include "formats/files/load_save.h"
+#include "formats/markers/camera_model.h"
 #include "formats/progress_book/progress_book.h"
 #include "formats/recording/session.h"
 #include "runtime/player/ui/window_picture.h"
@@ -315,6 +316,38 @@ TEST_F(WindowMended, ChangingTheExerciseDuringAnAttemptAsksFirst) {
     EXPECT_NE(asked.find("An attempt is running."), std::string::npos);
     EXPECT_NE(asked.find(" hint\n"), std::string::npos);  // the attempt goes on
 }
+
+#ifdef SONOCASE_FAKE_VIDEO
+// The tracker panel lists cameras by their names and lenses by their files; a camera keeps the lens
+// that was chosen for it, and another one does not take it over.
+TEST_F(WindowMended, ACameraKeepsTheLensThatWasChosenForIt) {
+    std::filesystem::create_directories(folder_ / "data/sonocase/cases");
+    CameraSetup setup;
+    setup.camera = assumed_camera(1280, 720);
+    setup.camera.rms_px = 0.1, setup.camera.sigma_focal_px = 1, setup.camera.pictures = 20;
+    for (const char* name : {"arm", "desk"})
+        folder_.write("data/sonocase/cases/" + std::string(name) + ".camera.json",
+                      format_camera(setup));
+    const std::string lens = folder_ / "data/sonocase/cases/desk.camera.json";
+    const auto click = [](int y) {
+        return "move 640 " + std::to_string(y) + "\nwait 2\ndown 0\nwait 2\nup 0\nwait 6\n";
+    };
+    // Rows of the open panel: the tracker, the lens, and what their lists show below them.
+    constexpr int kTracker = 166, kLens = 244, kDesk = 298, kArm = 328, kDeskLens = 346;
+    const auto chosen = [&](const std::string& clicks) {
+        const CommandResult result =
+            in_display("LD_PRELOAD=" SONOCASE_FAKE_VIDEO " " +
+                       command("--ui-scale 1", "wait 6\nkey f9\nwait 6\n" + clicks + "quit\n"));
+        EXPECT_EQ(result.status, 0) << result.error;
+        return settings()["tracker"].get<std::string>();
+    };
+    const std::string desk = click(kTracker) + click(kDesk), arm = click(kTracker) + click(kArm);
+    const std::string lens_of_desk = click(kLens) + click(kDeskLens);
+    EXPECT_EQ(chosen(desk), "camera:3");
+    EXPECT_EQ(chosen(lens_of_desk + arm), "camera:5");
+    EXPECT_EQ(chosen(desk + lens_of_desk + arm + desk), "camera:3," + lens);
+}
+#endif
 
 }  // namespace
 }  // namespace sonocase::runtime

@@ -37,7 +37,7 @@ double seconds_since(Clock::time_point start) {
 // Checks the predicate whenever the tracker notifies and every 5 ms, because changes of its health
 // are not notified; false if it has not come true within `seconds`.
 template <class Predicate>
-bool eventually(Event& event, Predicate predicate, double seconds = 15) {
+bool seen_after_events(Event& event, Predicate predicate, double seconds = 15) {
     const auto start = Clock::now();
     while (!predicate()) {
         if (seconds_since(start) > seconds) return false;
@@ -58,7 +58,7 @@ struct NotifyingTracker {
     Tracker& operator*() const { return *tracker; }
     template <class Predicate>
     bool eventually(Predicate predicate) {
-        return runtime::eventually(event, predicate);
+        return seen_after_events(event, predicate);
     }
     Event event;
     std::unique_ptr<Tracker> tracker;
@@ -544,25 +544,35 @@ TEST(IgtlTracker, AFloodTakesATenthOfACoreAndNoMemory) {
             tracker.event.notify();
         });
         const Flood sender(port, flood.message, flood.drips);
-        ASSERT_TRUE(tracker.eventually([&] {
-            const TrackerHealth health = tracker->health();
-            return flood.comes ? health.readings > 0 : health.connects > 0;
-        }));
+        // On a busy machine the sender and the tracker come to their turns late.
+        constexpr double kHangsS = 300;
+        ASSERT_TRUE(seen_after_events(
+            tracker.event,
+            [&] {
+                const TrackerHealth health = tracker->health();
+                return flood.comes ? health.readings > 0 : health.connects > 0;
+            },
+            kHangsS));
         const auto start = Clock::now();
         const double before_s = process_seconds();
         const int woken_before = woken;
         const std::uint64_t had = tracker->health().readings;
         const double memory_before_mb = resident_mb();
-        Event pause;
-        while (seconds_since(start) < 0.5) pause.wait(0.05);
+        // For half a second, and until poses have gone on: however long that takes, the share of a
+        // core and the number of wakes are those of the time that has passed.
+        Event pause;  // not woken by poses: this thread counts as well
+        EXPECT_TRUE(seen_after_events(
+            pause,
+            [&] {
+                return seconds_since(start) >= 0.5 &&
+                       (!flood.comes || tracker->health().readings > had);
+            },
+            kHangsS));
         const double wall_s = seconds_since(start), spent_s = process_seconds() - before_s;
         // A tenth of a core, what was saved up for it, and as much again for an unlucky measure.
         EXPECT_LT(spent_s, 0.1 * wall_s + 0.02 + 0.1);
         EXPECT_LT(woken - woken_before, 520 * wall_s);
         EXPECT_LT(resident_mb() - memory_before_mb, 30);
-        if (flood.comes) {
-            EXPECT_GT(tracker->health().readings, had);
-        }
         tracker->set_wake({});
     }
 }
@@ -688,7 +698,7 @@ TEST(IgtlServer, SurvivesAThousandConnects) {
         if (i % 3 == 0) socket->write(Bytes(100, 0xFF));
     }
     Event never;  // the server does not notify when clients come and go
-    EXPECT_TRUE(eventually(never, [&] { return (*server)->clients() == 0; }));
+    EXPECT_TRUE(seen_after_events(never, [&] { return (*server)->clients() == 0; }));
     auto tracker = start_tracker(0, true);
     for (int i = 0; i < 200; ++i) {
         Result<Socket> socket =

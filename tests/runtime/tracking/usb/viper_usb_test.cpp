@@ -254,10 +254,19 @@ TEST(ViperOverUsb, ComesBackWhenPluggedInAgain) {
     Trouble trouble;
     trouble.unplug_at = 40;
     DeviceSpec device;
+    device.vendor = 0x0F44;
+    device.product = 0xBF01;
     device.replug_after_s = 0.3;
-    const auto seen = run_viper(trouble, 20, 70, device);
+    // It is pulled out once, and then stays: on a busy machine fewer than its 40 readings count,
+    // and the rest comes afterwards, however long that takes.
+    const auto make = [&, plugged = 0]() mutable {
+        return std::make_unique<ViperFirmware>(plugged++ == 0 ? trouble : Trouble{});
+    };
+    constexpr double kHangsS = 300;
+    const auto seen = run_client("viper", device, make, kHangsS, 70);
     EXPECT_GE(seen["readings"].get<int>(), 70);
-    EXPECT_EQ(seen["connects"], 2);
+    EXPECT_GE(seen["connects"].get<int>(), 2);  // more where the emulation was halted for long
+    EXPECT_TRUE(says(seen, "unplugged")) << seen;
     expect_poses(seen);
 }
 
