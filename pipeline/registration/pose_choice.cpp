@@ -21,7 +21,7 @@ constexpr double kCloseScore = 1.10, kQuarterTurn = 1.25;
 constexpr double kMirrorScore = 1.06;
 // Torsos without a waist, read all round, fit upside down 5 % better to 5 % worse: neither is told
 // then. Where half of the skin or more was not read they fit up to 14 % better.
-// Of another build, whose belly or back is what fits worst, the wrong side fits up to 13 % better.
+// On another build, whose belly or back fits worst, the wrong side fits up to 13 % better.
 constexpr double kOppositeScore = 1.06, kOppositeScoreOfPart = 1.2, kWholeCoverage = 0.65;
 constexpr double kFrontScore = 1.2;
 // A pose that reaches less than this share of the readings that another reaches has slid off them,

@@ -14,7 +14,7 @@ Result<ImportedLabels> import_inputs(const Recipe& recipe,
                                      const MeshImportOptions& options,
                                      const Progress& progress);
 
-// Of the label map that organ meshes become. Errors: those of reading the meshes.
+// Measures the label map that organ meshes become. Errors: those of reading the meshes.
 Result<MeshExtent> mesh_inputs_extent(const Recipe& recipe);
 
 }  // namespace sonocase::pipeline::inline stages

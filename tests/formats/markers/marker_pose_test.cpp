@@ -663,7 +663,7 @@ PictureRun run_of_pictures(const CameraModel& camera,
         run.poor += reading.status == MarkerStatus::poor, run.two_poses += reading.two_poses;
         if (reading.status == MarkerStatus::good) {
             ++run.good;
-            // Of a rolling shutter the rows in which the body lies count.
+            // With a rolling shutter the rows in which the body lies count.
             Pixel middle;
             EXPECT_TRUE(project(camera, probe(t).translation, middle, nullptr));
             const Rigid held_so =
@@ -811,7 +811,7 @@ struct PhotographFit {
 PhotographFit squares_in(const GreyPicture& picture, TagDetector& detector) {
     std::vector<SeenTag> read, tags;
     detector.read(picture, {0, 0, picture.width_px, picture.height_px}, 1, read);
-    // Of smaller ones the cells are hardly wider than a pixel.
+    // The cells of smaller tags are hardly wider than a pixel.
     constexpr double kMinEdgePx = 14;
     for (SeenTag& tag : read) {
         double edge = 1e9;

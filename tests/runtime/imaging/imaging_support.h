@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include "runtime/imaging/renderer.h"
@@ -101,6 +102,20 @@ inline FrameInput random_input(Random& random, std::uint32_t frame) {
     input.needle.direction = random.direction();
     input.frame = frame;
     return input;
+}
+
+// Of two series of the same length, in [-1, 1].
+inline double correlation(const std::vector<double>& a, const std::vector<double>& b) {
+    const auto n = static_cast<double>(a.size());
+    const double ma = std::accumulate(a.begin(), a.end(), 0.0) / n,
+                 mb = std::accumulate(b.begin(), b.end(), 0.0) / n;
+    double aa = 0, bb = 0, ab = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        aa += (a[i] - ma) * (a[i] - ma);
+        bb += (b[i] - mb) * (b[i] - mb);
+        ab += (a[i] - ma) * (b[i] - mb);
+    }
+    return ab / std::sqrt(aa * bb);
 }
 
 }  // namespace sonocase::runtime

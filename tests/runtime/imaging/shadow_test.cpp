@@ -219,18 +219,6 @@ TEST(ShadowOfLung, ItsGrainIsSandThatSlidesUnlessAirLiesBeforeIt) {
                 out.push_back(b.envelope(row, l));
         return out;
     };
-    const auto correlation = [](const std::vector<double>& x, const std::vector<double>& y) {
-        const auto n = static_cast<double>(x.size());
-        const double ma = std::accumulate(x.begin(), x.end(), 0.0) / n,
-                     mb = std::accumulate(y.begin(), y.end(), 0.0) / n;
-        double ab = 0, aa = 0, bb = 0;
-        for (std::size_t i = 0; i < x.size(); ++i) {
-            ab += (x[i] - ma) * (y[i] - mb);
-            aa += (x[i] - ma) * (x[i] - ma);
-            bb += (y[i] - mb) * (y[i] - mb);
-        }
-        return ab / std::sqrt(aa * bb);
-    };
     const std::vector<double> at[] = {lines_of(3, 0), lines_of(3.05, 0), lines_of(6, 0)};
     const double near = correlation(at[0], at[1]), far = correlation(at[0], at[2]);
     const double air = correlation(lines_of(3, 100), lines_of(6, 100));

@@ -10,6 +10,7 @@
 
 #include "cell_bench.h"
 #include "formats/machine/machine.h"
+#include "imaging_support.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -137,19 +138,6 @@ class Scan {
     std::optional<Renderer> renderer_;
     std::vector<std::uint8_t> pixels_;
 };
-
-double correlation(const std::vector<double>& a, const std::vector<double>& b) {
-    const auto n = static_cast<double>(a.size());
-    const double ma = std::accumulate(a.begin(), a.end(), 0.0) / n,
-                 mb = std::accumulate(b.begin(), b.end(), 0.0) / n;
-    double aa = 0, bb = 0, ab = 0;
-    for (std::size_t i = 0; i < a.size(); ++i) {
-        aa += (a[i] - ma) * (a[i] - ma);
-        bb += (b[i] - mb) * (b[i] - mb);
-        ab += (a[i] - ma) * (b[i] - mb);
-    }
-    return ab / std::sqrt(aa * bb);
-}
 
 // Contrast of each patch: its deviation over that without the effect.
 std::vector<double> contrasts(Scan& with, Scan& without, Vector3 moved_mm, int x_px) {

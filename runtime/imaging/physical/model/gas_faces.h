@@ -78,7 +78,7 @@ inline constexpr double kLungStreakMm = 4, kLungStreakDb = 12;
 inline constexpr double kAirTailDb = -7, kAirReverbLoss = 0.62, kAirEdgeMm = 5;
 // Its grain changes as the lung slides: it is that of two fields at kLungGrainMm from each other,
 // mixed by where between them the lung has come. An M-line of a lung that slides is sand.
-inline constexpr double kLungGrainMm = 0.4;  // assumed: echoes that went to and fro soon change
+inline constexpr double kLungGrainMm = 0.4;  // assumed; the echoes have gone to and fro many times
 struct LungGrain {
     std::uint32_t field = 1;  // this one and the next, as `frame` of noise_start()
     float weight[2] = {1, 0};
