@@ -317,7 +317,7 @@ TEST_F(WindowMended, ChangingTheExerciseDuringAnAttemptAsksFirst) {
     EXPECT_NE(asked.find(" hint\n"), std::string::npos);  // the attempt goes on
 }
 
-#ifdef SONOCASE_FAKE_VIDEO
+#ifdef SONOCASE_PRELOADED_VIDEO
 // The tracker panel lists cameras by their names and lenses by their files; a camera keeps the lens
 // that was chosen for it, and another one does not take it over.
 TEST_F(WindowMended, ACameraKeepsTheLensThatWasChosenForIt) {
@@ -336,7 +336,7 @@ TEST_F(WindowMended, ACameraKeepsTheLensThatWasChosenForIt) {
     constexpr int kTracker = 166, kLens = 244, kDesk = 298, kArm = 328, kDeskLens = 346;
     const auto chosen = [&](const std::string& clicks) {
         const CommandResult result =
-            in_display("LD_PRELOAD=" SONOCASE_FAKE_VIDEO " " +
+            in_display("LD_PRELOAD=" SONOCASE_PRELOADED_VIDEO " " +
                        command("--ui-scale 1", "wait 6\nkey f9\nwait 6\n" + clicks + "quit\n"));
         EXPECT_EQ(result.status, 0) << result.error;
         return settings()["tracker"].get<std::string>();
