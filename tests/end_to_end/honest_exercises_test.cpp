@@ -143,9 +143,10 @@ TEST(HonestExercises, ScriptsOfTheGalleryPassTheirMarks) {
 TEST(HonestExercises, ScriptsOfTheWomanPassTheirMarks) {
     const std::string data = SONOCASE_DATA;
     if (!fs::exists(data + "/organ_meshes")) GTEST_SKIP() << "no " << data;
-    const auto& cooked =
-        testing::cooked_scenario("atlas-woman/case.toml", "--set resample.voxel_mm=2");
+    const auto& cooked = testing::cooked_scenario(
+        "atlas-woman/case.toml", "--set import.voxel_mm=2 --set resample.voxel_mm=2");
     expect_scripts_pass(Case(cooked.path));
+    testing::expect_expert_ticks_all(cooked.path, "diaphragm");
 }
 
 // The experts of the procedures pass where a trainee meets them: cooked, on the mannequin, through
