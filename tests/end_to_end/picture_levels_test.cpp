@@ -361,7 +361,7 @@ TEST(PictureLevels, OfTheRealTorso) {
 
 // From below the woman's ribs, up through the liver: a curve without gaps closes the picture, and
 // behind it lies the liver once more, 14 dB weaker: grey, neither black nor as bright.
-TEST(PictureLevels, TheDomeOfTheDiaphragmClosesThePictureOfTheWoman) {
+TEST(PictureLevels, OfTheWomanWhoseDiaphragmClosesThePicture) {
     const std::string data = SONOCASE_DATA;
     if (!fs::exists(data + "/organ_meshes")) GTEST_SKIP() << "no " << data;
     auto bundle =
@@ -369,11 +369,14 @@ TEST(PictureLevels, TheDomeOfTheDiaphragmClosesThePictureOfTheWoman) {
                                              "--set import.voxel_mm=2 --set resample.voxel_mm=2")
                         .path);
     ASSERT_TRUE(bundle) << bundle.error().message();
+    int domes = 0;
     for (const EmbeddedExercise& embedded : bundle->exercises) {
-        if (embedded.name != "diaphragm") continue;
         auto exercise = parse_exercise(embedded.toml, embedded.name);
         ASSERT_TRUE(exercise) << exercise.error().message();
         Picture picture(*bundle, *exercise, "modern");
+        picture.draw(picture.start());
+        EXPECT_LE(std::abs(picture.auto_db()), kMaxAutoDb) << embedded.name;
+        if (embedded.name != "diaphragm") continue;
         picture.draw(picture.scripted("expert", 6));
         const auto dome = picture.dome();
         std::printf("beams %d, curve %.2f %.2f %.2f of the liver's grey, behind it %.2f\n",
@@ -382,9 +385,9 @@ TEST(PictureLevels, TheDomeOfTheDiaphragmClosesThePictureOfTheWoman) {
         for (const double part : dome.curve) EXPECT_GT(part, 1.3);  // speckle alone: about 1.15
         EXPECT_GT(dome.behind, 0.2);
         EXPECT_LT(dome.behind, 0.75);
-        return;
+        ++domes;
     }
-    FAIL() << "no exercise named diaphragm";
+    EXPECT_EQ(domes, 1);
 }
 
 }  // namespace
