@@ -306,6 +306,20 @@ TEST_F(WindowMended, AnAbsentTrackerIsSaidOnThePicture) {
               0.6 * load_picture(folder_ / "mouse.png").mean(400, 150, 900, 250) + 8);
 }
 
+// Where nothing is asked of a needle, none is spoken of until one is taken.
+TEST_F(WindowMended, TheCardOfAScanSaysNothingOfNeedles) {
+    CaseBundle bundle = sonocase::testing::small_case();
+    std::string& toml = bundle.exercises.front().toml;
+    toml.replace(toml.find("\"vascular\""), 10, "\"scan\"");
+    ASSERT_TRUE(save_bundle(bundle, bundle_));
+    ASSERT_EQ(run("", "wait 6\nkey b\nwait 6\n" + shot("scan") + "key n\nwait 6\n" +
+                          shot("needle") + "quit\n")
+                  .status,
+              0);
+    EXPECT_FALSE(says("scan", "Skin punctures") || says("scan", "Tip in view"));
+    EXPECT_TRUE(says("needle", "Skin punctures") && says("needle", "Tip in view"));
+}
+
 // A second F5 leaves, the first only asks.
 TEST_F(WindowMended, ChangingTheExerciseDuringAnAttemptAsksFirst) {
     ASSERT_EQ(run("", "wait 6\nkey b\nwait 6\nkey f5\nwait 3\n" + shot("asked") +
