@@ -705,8 +705,8 @@ TEST_F(MarkerPose, DISABLED_LongRunOfPictures) {
 
 // Times a tool is hidden for half a second and shown again, near where it was or elsewhere. In
 // light that changes from picture to picture nothing tells where it came. Where it then lies so far
-// away, or so steep, that the whole picture shows fewer than two of its tags, it is no fault that it
-// is not back.
+// away, or so steep, that the whole picture shows fewer than two of its tags, it is no fault that
+// it is not back.
 struct HiddenRun {
     int times = 0, readable = 0, in_time = 0, good_in_time = 0;  // in time: of the readable ones
     double lost_after_s = 0, back_after_s = 0;                   // the longest
