@@ -125,12 +125,16 @@ double BreathingField::weight(Point3 p) const {
     if (!(fx >= -1 && fy >= -1 && fz >= -1 && fx < grid_.size.x && fy < grid_.size.y &&
           fz < grid_.size.z))
         return 0;
+    const int x = static_cast<int>(fx), y = static_cast<int>(fy), z = static_cast<int>(fz);
+    const double across[2] = {1 - (v.x - fx), v.x - fx}, along[2] = {1 - (v.y - fy), v.y - fy},
+                 up[2] = {1 - (v.z - fz), v.z - fz};
+    // Beyond the last cells lie zeros; inside, which is nearly everywhere, none is looked for.
+    const bool inside = x >= 0 && y >= 0 && z >= 0 && x + 1 < grid_.size.x &&
+                        y + 1 < grid_.size.y && z + 1 < grid_.size.z;
     for (int c = 0; c < 8; ++c) {
-        const int i = static_cast<int>(fx) + (c & 1), j = static_cast<int>(fy) + (c >> 1 & 1),
-                  k = static_cast<int>(fz) + (c >> 2);
-        if (!grid_.contains(i, j, k)) continue;
-        sum += (c & 1 ? v.x - fx : 1 - (v.x - fx)) * (c >> 1 & 1 ? v.y - fy : 1 - (v.y - fy)) *
-               (c >> 2 ? v.z - fz : 1 - (v.z - fz)) *
+        const int i = x + (c & 1), j = y + (c >> 1 & 1), k = z + (c >> 2);
+        if (!inside && !grid_.contains(i, j, k)) continue;
+        sum += across[c & 1] * along[c >> 1 & 1] * up[c >> 2] *
                static_cast<double>(cells_[grid_.index(i, j, k)]);
     }
     return sum;
