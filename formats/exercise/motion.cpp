@@ -128,14 +128,16 @@ double BreathingField::weight(Point3 p) const {
     const int x = static_cast<int>(fx), y = static_cast<int>(fy), z = static_cast<int>(fz);
     const double across[2] = {1 - (v.x - fx), v.x - fx}, along[2] = {1 - (v.y - fy), v.y - fy},
                  up[2] = {1 - (v.z - fz), v.z - fz};
-    // Beyond the last cells lie zeros; inside, which is nearly everywhere, none is looked for.
     const bool inside = x >= 0 && y >= 0 && z >= 0 && x + 1 < grid_.size.x &&
-                        y + 1 < grid_.size.y && z + 1 < grid_.size.z;
-    for (int c = 0; c < 8; ++c) {
-        const int i = x + (c & 1), j = y + (c >> 1 & 1), k = z + (c >> 2);
-        if (!inside && !grid_.contains(i, j, k)) continue;
+                        y + 1 < grid_.size.y && z + 1 < grid_.size.z;  // nearly everywhere
+    const std::ptrdiff_t row = grid_.size.x, plane = row * grid_.size.y;
+    const std::ptrdiff_t corner = x + row * y + plane * z;
+    const std::ptrdiff_t step[8] = {0,     1,         row,         row + 1,
+                                    plane, plane + 1, plane + row, plane + row + 1};
+    for (int c = 0; c < 8; ++c) {  // beyond the last cells lie zeros
+        if (!inside && !grid_.contains(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2))) continue;
         sum += across[c & 1] * along[c >> 1 & 1] * up[c >> 2] *
-               static_cast<double>(cells_[grid_.index(i, j, k)]);
+               static_cast<double>(cells_[static_cast<std::size_t>(corner + step[c])]);
     }
     return sum;
 }
