@@ -254,8 +254,23 @@ Given mirrored(Given given, const Mirror& mirror) {
     return given;
 }
 
-// Best first, and of those that are as good as equal the one that fits best without a warp; those
-// that have slid off the readings last.
+// Cosines between two poses' directions to the head, and to the front.
+double heads(const JudgedPose& a, const JudgedPose& b) {
+    return dot(a.rigid.target_from_skin.rotation.column(2),
+               b.rigid.target_from_skin.rotation.column(2));
+}
+double fronts(const JudgedPose& a, const JudgedPose& b) {
+    return dot(a.rigid.target_from_skin.rotation.column(1),
+               b.rigid.target_from_skin.rotation.column(1));
+}
+
+bool turned_front_to_back(const JudgedPose& a, const JudgedPose& b) {
+    return heads(a, b) > 0.7 && fronts(a, b) < -0.5;
+}
+
+// Best first; those that have slid off the readings last. Of a pose and one with its head where the
+// other has its feet that are as good as equal, the one that fits best without a warp; of poses
+// turned front to back that tells nothing.
 void rank(std::vector<JudgedPose>& judged) {
     double most = 0;
     for (const JudgedPose& p : judged) most = std::max(most, p.coverage);
@@ -269,6 +284,7 @@ void rank(std::vector<JudgedPose>& judged) {
         const double least = std::max(kSlidOff * most, kMostReadings);
         if (std::min(judged[0].coverage, judged[n].coverage) < least) break;
         if (judged[n].score_mm > kEqualScore * judged[0].score_mm) break;
+        if (heads(judged[0], judged[n]) > -0.5) continue;
         if (judged[n].rigid.score_mm < judged[best].rigid.score_mm) best = n;
     }
     const auto at = judged.begin() + static_cast<std::ptrdiff_t>(best);
@@ -380,6 +396,7 @@ void check_front(const FitContext& s,
                  const Given& given,
                  const SplinePenalty& field,
                  const RigidOptions& options,
+                 const std::vector<JudgedPose>& judged,
                  PoseChoice* choice) {
     const JudgedPose& best = choice->best;
     Given turned = given;
@@ -394,8 +411,12 @@ void check_front(const FitContext& s,
     // x -> middle + half (turn^T (x - middle)) after the pose.
     const Vector3 from = best.rigid.target_from_skin.translation - middle;
     const Rigid start{half, middle + half * (transpose(turn) * from)};
-    const double score =
+    double score =
         judge(s, s.target, turned, field, refine_rigid(s.coarse, s.target, start, rigid)).score_mm;
+    for (const JudgedPose& p : judged)  // the search may have come to a better one
+        if (turned_front_to_back(best, p))
+            score = std::min(score,
+                             std::sqrt(std::max(0.0, p.score_mm * p.score_mm - p.back_cost_mm2)));
     choice->front_turned_score_mm = score;
     const double here = best.score_mm;
     const std::string scores =
@@ -447,7 +468,7 @@ PoseChoice choose_pose(const FitContext& s,
     rigid.starts = options.rigid.starts;
     check_head(s, given, field, rigid, progress, &choice);
     check_hands(s, given, field, rigid, judged, progress, &choice);
-    check_front(s, given, field, rigid, &choice);
+    check_front(s, given, field, rigid, judged, &choice);
     return choice;
 }
 
