@@ -125,13 +125,19 @@ double BreathingField::weight(Point3 p) const {
     if (!(fx >= -1 && fy >= -1 && fz >= -1 && fx < grid_.size.x && fy < grid_.size.y &&
           fz < grid_.size.z))
         return 0;
-    for (int c = 0; c < 8; ++c) {
-        const int i = static_cast<int>(fx) + (c & 1), j = static_cast<int>(fy) + (c >> 1 & 1),
-                  k = static_cast<int>(fz) + (c >> 2);
-        if (!grid_.contains(i, j, k)) continue;
-        sum += (c & 1 ? v.x - fx : 1 - (v.x - fx)) * (c >> 1 & 1 ? v.y - fy : 1 - (v.y - fy)) *
-               (c >> 2 ? v.z - fz : 1 - (v.z - fz)) *
-               static_cast<double>(cells_[grid_.index(i, j, k)]);
+    const int x = static_cast<int>(fx), y = static_cast<int>(fy), z = static_cast<int>(fz);
+    const double across[2] = {1 - (v.x - fx), v.x - fx}, along[2] = {1 - (v.y - fy), v.y - fy},
+                 up[2] = {1 - (v.z - fz), v.z - fz};
+    const bool inside = x >= 0 && y >= 0 && z >= 0 && x + 1 < grid_.size.x &&
+                        y + 1 < grid_.size.y && z + 1 < grid_.size.z;  // nearly everywhere
+    const std::ptrdiff_t row = grid_.size.x, plane = row * grid_.size.y;
+    const std::ptrdiff_t corner = x + row * y + plane * z;
+    const std::ptrdiff_t step[8] = {0,     1,         row,         row + 1,
+                                    plane, plane + 1, plane + row, plane + row + 1};
+    for (int c = 0; c < 8; ++c) {  // beyond the last cells lie zeros
+        if (!inside && !grid_.contains(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2))) continue;
+        sum += across[c & 1] * along[c >> 1 & 1] * up[c >> 2] *
+               static_cast<double>(cells_[static_cast<std::size_t>(corner + step[c])]);
     }
     return sum;
 }

@@ -45,9 +45,12 @@ bool CaseAnatomy::at_edge(Point3 p) const {
     return false;
 }
 
-Point3 CaseAnatomy::at_rest(Point3 p, double time_s) const {
-    if (field_.empty()) return p;
-    return p - field_.weight(p) * motion_at(breathing_, {}, time_s).breathing_mm;
+Vector3 CaseAnatomy::breath_mm(double time_s) const {
+    return field_.empty() ? Vector3{} : motion_at(breathing_, {}, time_s).breathing_mm;
+}
+
+Point3 CaseAnatomy::at_rest(Point3 p, Vector3 breath_mm) const {
+    return field_.empty() ? p : p - field_.weight(p) * breath_mm;
 }
 
 Point3 CaseAnatomy::moved(Point3 rest, double time_s) const {

@@ -30,7 +30,10 @@ class Anatomy {
     virtual double exit_distance(Point3 from, Vector3 direction, double reach) const = 0;
     // The place at rest of the tissue that is now at p, and the place now of the tissue that is at
     // `rest` when at rest; at most greatest_shift_mm() apart.
-    virtual Point3 at_rest(Point3 p, double /*time_s*/) const { return p; }
+    Point3 at_rest(Point3 p, double time_s) const { return at_rest(p, breath_mm(time_s)); }
+    // The same where many points of one moment are asked for: breath_mm() is what moves wholly.
+    virtual Vector3 breath_mm(double /*time_s*/) const { return {}; }
+    virtual Point3 at_rest(Point3 p, Vector3 /*breath_mm*/) const { return p; }
     virtual Point3 moved(Point3 rest, double /*time_s*/) const { return rest; }
     virtual double greatest_shift_mm() const { return 0; }
     // True if labels say where sound passes, so that blocks_sound() and shadows are defined.
@@ -60,7 +63,9 @@ class CaseAnatomy final : public Anatomy {
     bool inside(Point3 p) const override { return label(p) != 0; }
     int label(Point3 p) const override;
     double exit_distance(Point3 from, Vector3 direction, double reach) const override;
-    Point3 at_rest(Point3 p, double time_s) const override;
+    using Anatomy::at_rest;
+    Vector3 breath_mm(double time_s) const override;
+    Point3 at_rest(Point3 p, Vector3 breath_mm) const override;
     Point3 moved(Point3 rest, double time_s) const override;
     double greatest_shift_mm() const override { return std::abs(breathing_.amplitude_mm); }
     bool knows_tissue() const override { return true; }

@@ -150,10 +150,11 @@ bool walk(const Anatomy& anatomy,
     if (gap < 0) return false;
     // The gap closes: tissue behind it moves up to the face, the less the deeper it lies.
     double reach = gap;
+    const Vector3 breath_mm = anatomy.breath_mm(time_s);
     constexpr double kFade = 0.97802;  // e^(-kSightStepMm / 45): how far down a gap is felt
     for (double s = 0.5 * kSightStepMm; s < line.length_mm; s += kSightStepMm, reach *= kFade) {
         const Point3 p = start + (s + reach) * along;
-        if (!meet(anatomy.label(anatomy.at_rest(p, time_s)), s)) break;
+        if (!meet(anatomy.label(anatomy.at_rest(p, breath_mm)), s)) break;
     }
     return true;
 }

@@ -43,15 +43,17 @@ struct BuildTime {
     double alone_s = 0;      // by the clock, on a machine with nothing else to do
 };
 
-// Estimates the time by a law fitted to 29 builds (docs/farm.md has the table):
-//     processor_s = speed * (f + (s + t (edge / 64)^3) L + b C + r R + c C^(2/3) + d F + e (K - 4)
-//                            + p + m M + (l N + q P) C)
-// L number of labels; C, R, M millions of voxels, cooked, of the region, and of a map that organ
-// meshes become; F millions of faces between labels, K of nodes between thick slices where they are
-// more than 4; edge of the textures; p what it takes to read the map, or to sample an analytic
-// body; N lesions, P pools of free fluid; f the fit, which a known map and the patient's own skin
-// do without. A fit that needs the elastic warp takes some 3 s more, which is not known beforehand
-// but of organ meshes, whose mannequin is another body's.
+// Estimates the time by a law fitted to 26 builds (docs/farm.md has the table):
+//     processor_s = speed * (a + f + t (edge / 64)^3 T + b B + s S + d F + e (K - 4) + r R + p
+//                            + n (N - 3) + m M + (l L + q P) C)
+// a the program's start and end; T number of textures, of this edge; B, S, R millions of cooked
+// voxels in the body, in its surfaces and in the region; F millions of faces between the labels of
+// the map; K millions of nodes between thick slices, as a torso would have them, where they are
+// more than 4; p what it takes to sample an analytic body; N millions of voxels of a map from a
+// file, where they are more than 3; M those that organ meshes become; L lesions and P pools of free
+// fluid in C millions of cooked voxels; f the fit, which a known map and the patient's own skin do
+// without. A fit that needs the elastic warp takes some 1 to 3 s more and each refit 0.5, which is
+// not known beforehand but of organ meshes, whose mannequin is another body's.
 //
 // speed: machine_speed(); threads: 0 for all cores.
 BuildTime build_time(const CaseSize& size, int texture_edge, double speed, int threads);
@@ -62,7 +64,8 @@ BuildTime build_time(
     const Recipe& recipe, const CaseSize& size, double sized_voxel_mm, double speed, int threads);
 
 // Returns the processor seconds that a fixed piece of the pipeline's own work takes on this machine
-// as it is now, over those on the machine of the fit. Takes a third of a second.
+// as it is now, over those on the machine of the fit; of three runs the fastest counts. Takes a
+// third of a second.
 double machine_speed();
 
 }  // namespace sonocase::pipeline::inline cook

@@ -23,7 +23,16 @@ constexpr double kMirrorScore = 1.06;
 // then. Where half of the skin or more was not read they fit up to 14 % better.
 // On another build, whose belly or back fits worst, the wrong side fits up to 13 % better.
 constexpr double kOppositeScore = 1.06, kOppositeScoreOfPart = 1.2, kWholeCoverage = 0.65;
+// Before the warp as well as after it: read all round, right heads fit at least 1 % better in the
+// product of both scores, turned ones 2 to 39 % worse. Of sweeps of the front right ones fit 19 %
+// better to 24 % worse, and turned ones 14 % better to 19 % worse: nothing tells them apart.
+constexpr double kOppositeBothWays = 1.03;
 constexpr double kFrontScore = 1.2;
+// A pose's score moves by some 4 % with the start that found it, so that scores nearer to each
+// other are equal. Then the pose whose skin lay closer before it was deformed is the better one.
+constexpr double kEqualScore = 1.04;
+// Poses that reach fewer readings are not told apart by how close the rest of them lie.
+constexpr double kMostReadings = 0.5;
 // A pose that reaches less than this share of the readings that another reaches has slid off them,
 // where gaps cost no more than the missing counterparts and a hint is off.
 constexpr double kSlidOff = 0.5;
@@ -153,6 +162,8 @@ bool drop_open_side(const FitContext& s,
     const bool turned = std::abs(dot(front(*with), front(*without))) < 0.7;
     if (followed && (!turned || bare(*with) < kQuarterTurn * bare(*without))) return false;
     for (JudgedPose& p : judged) {
+        const double rigid = p.rigid.score_mm;
+        p.rigid.score_mm = std::sqrt(std::max(0.0, rigid * rigid - p.back_cost_mm2));
         p.score_mm = bare(p);
         p.back_cost_mm2 = 0;
     }
@@ -243,7 +254,23 @@ Given mirrored(Given given, const Mirror& mirror) {
     return given;
 }
 
-// Best first; those that have slid off the readings last.
+// Cosines between two poses' directions to the head, and to the front.
+double heads(const JudgedPose& a, const JudgedPose& b) {
+    return dot(a.rigid.target_from_skin.rotation.column(2),
+               b.rigid.target_from_skin.rotation.column(2));
+}
+double fronts(const JudgedPose& a, const JudgedPose& b) {
+    return dot(a.rigid.target_from_skin.rotation.column(1),
+               b.rigid.target_from_skin.rotation.column(1));
+}
+
+bool turned_front_to_back(const JudgedPose& a, const JudgedPose& b) {
+    return heads(a, b) > 0.7 && fronts(a, b) < -0.5;
+}
+
+// Best first; those that have slid off the readings last. Of a pose and one with its head where the
+// other has its feet that are as good as equal, the one that fits best without a warp; of poses
+// turned front to back that tells nothing.
 void rank(std::vector<JudgedPose>& judged) {
     double most = 0;
     for (const JudgedPose& p : judged) most = std::max(most, p.coverage);
@@ -252,6 +279,16 @@ void rank(std::vector<JudgedPose>& judged) {
             const bool a_off = a.coverage < kSlidOff * most, b_off = b.coverage < kSlidOff * most;
             return a_off == b_off ? a.score_mm < b.score_mm : b_off;
         });
+    std::size_t best = 0;
+    for (std::size_t n = 1; n < judged.size(); ++n) {
+        const double least = std::max(kSlidOff * most, kMostReadings);
+        if (std::min(judged[0].coverage, judged[n].coverage) < least) break;
+        if (judged[n].score_mm > kEqualScore * judged[0].score_mm) break;
+        if (heads(judged[0], judged[n]) > -0.5) continue;
+        if (judged[n].rigid.score_mm < judged[best].rigid.score_mm) best = n;
+    }
+    const auto at = judged.begin() + static_cast<std::ptrdiff_t>(best);
+    std::rotate(judged.begin(), at, at + 1);
 }
 
 // What the scores of a pose and of its opposite tell.
@@ -324,26 +361,33 @@ void check_head(const FitContext& s,
     Given turned = given;
     turned.hints.up = -*given.hints.up;
     rigid.starts = std::max(1, rigid.starts / kFewerStarts);
-    double score = INFINITY;
-    for (const JudgedPose& p : judge_candidates(s, s.target, turned, field, rigid, progress))
-        score = std::min(score, p.score_mm);
+    double score = INFINITY, rigid_score = INFINITY;
+    for (const JudgedPose& p : judge_candidates(s, s.target, turned, field, rigid, progress)) {
+        if (p.score_mm >= score) continue;
+        score = p.score_mm;
+        rigid_score = p.rigid.score_mm;
+    }
     choice->turned_score_mm = score;
-    const double best = choice->best.score_mm;
-    const std::string scores =
-        text("it fits to %.2f mm the other way and to %.2f mm as given", score, best);
-    const Verdict verdict = verdict_of(choice->best, score);
+    const double best = choice->best.score_mm, rigid_best = choice->best.rigid.score_mm;
+    const std::string scores = text(
+        "fits to %.2f mm the other way and to %.2f mm as given (%.2f and %.2f mm before the "
+        "warp)",
+        score, best, rigid_score, rigid_best);
+    Verdict verdict = verdict_of(choice->best, score);
+    if (verdict == Verdict::untold && choice->best.skin_coverage >= kWholeCoverage &&
+        best * rigid_best > kOppositeBothWays * score * rigid_score)
+        verdict = Verdict::wrong;
     if (verdict == Verdict::wrong) {
-        choice->head = "wrong: " + scores;
-        choice->warnings.push_back(text(
-            "the head direction seems to point to the feet: the skin fits to %.2f mm the other "
-            "way and to %.2f mm as given; turn its sign (--up), or give two landmarks such as "
-            "crotch and navel if it is right (--landmarks FILE.csv)",
-            score, best));
+        choice->head = "wrong: it " + scores;
+        choice->warnings.push_back("the head direction seems to point to the feet: the skin " +
+                                   scores +
+                                   "; turn its sign (--up), or give two landmarks such as crotch "
+                                   "and navel if it is right (--landmarks FILE.csv)");
     } else if (verdict == Verdict::untold && given.landmarks.size() < 2) {
-        choice->head = "not told by the skin: " + scores +
+        choice->head = "not told by the skin: it " + scores +
                        "; two landmarks such as crotch and navel would tell (--landmarks FILE.csv)";
     } else {
-        choice->head = "right: " + scores;
+        choice->head = "right: it " + scores;
     }
 }
 
@@ -352,6 +396,7 @@ void check_front(const FitContext& s,
                  const Given& given,
                  const SplinePenalty& field,
                  const RigidOptions& options,
+                 const std::vector<JudgedPose>& judged,
                  PoseChoice* choice) {
     const JudgedPose& best = choice->best;
     Given turned = given;
@@ -366,8 +411,12 @@ void check_front(const FitContext& s,
     // x -> middle + half (turn^T (x - middle)) after the pose.
     const Vector3 from = best.rigid.target_from_skin.translation - middle;
     const Rigid start{half, middle + half * (transpose(turn) * from)};
-    const double score =
+    double score =
         judge(s, s.target, turned, field, refine_rigid(s.coarse, s.target, start, rigid)).score_mm;
+    for (const JudgedPose& p : judged)  // the search may have come to a better one
+        if (turned_front_to_back(best, p))
+            score = std::min(score,
+                             std::sqrt(std::max(0.0, p.score_mm * p.score_mm - p.back_cost_mm2)));
     choice->front_turned_score_mm = score;
     const double here = best.score_mm;
     const std::string scores =
@@ -419,7 +468,7 @@ PoseChoice choose_pose(const FitContext& s,
     rigid.starts = options.rigid.starts;
     check_head(s, given, field, rigid, progress, &choice);
     check_hands(s, given, field, rigid, judged, progress, &choice);
-    check_front(s, given, field, rigid, &choice);
+    check_front(s, given, field, rigid, judged, &choice);
     return choice;
 }
 

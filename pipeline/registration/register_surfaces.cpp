@@ -204,18 +204,25 @@ StageReport warp_report(const FitContext& s,
     return report;
 }
 
+constexpr double kSlidOff = 0.5;  // share of the readings that were reached
+
 RegisterResult align(const FitContext& s,
                      const RegisterOptions& options,
                      const Stopwatch& watch,
                      const Progress& progress) {
     const PoseChoice choice = choose_pose(s, options, progress);
-    const Rigid pose =
-        refine_rigid_robust(s.fine, s.target, choice.best.rigid.target_from_skin, s.hints, 6, 15);
-    RegisterResult result;
-    result.registration = in_frames(s, RigidQuadratic::from_rigid(pose));
-    result.registration.min_det_jacobian = 1;
-    result.rigid_fit = result.quadratic_fit = result.fit =
-        measure_fit(s.skin, s.target, result.registration);
+    const auto take = [&](const Rigid& pose, RegisterResult* result) {
+        result->registration = in_frames(s, RigidQuadratic::from_rigid(pose));
+        result->registration.min_det_jacobian = 1;
+        result->fit = measure_fit(s.skin, s.target, result->registration);
+    };
+    const Rigid chosen = choice.best.rigid.target_from_skin;
+    RegisterResult result, before;
+    take(refine_rigid_robust(s.fine, s.target, chosen, s.hints, 6, 15), &result);
+    // Where bodies differ much the least gaps are those of a pose that has slid off the readings.
+    take(chosen, &before);
+    if (result.fit.coverage < kSlidOff * before.fit.coverage) result = before;
+    result.rigid_fit = result.quadratic_fit = result.fit;
     result.runners_up = choice.runners_up;
     result.report = align_report(s, choice, result.fit, watch.seconds());
     result.registration.reports = {result.report};

@@ -37,7 +37,7 @@
 
 namespace sonocase::pipeline::inline registration {
 
-inline constexpr int kRegisterVersion = 7;
+inline constexpr int kRegisterVersion = 8;
 
 // The same point of the body on both surfaces, e.g. navel or crotch.
 struct Landmark {

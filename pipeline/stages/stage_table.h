@@ -166,15 +166,18 @@ struct CaseSize {
     double interpolated_nodes = 0;
     // Millions of faces between nodes of different labels; of a torso where nobody has counted.
     double surfaces = 0;
+    // Area of these faces, and what they enclose; of a torso where nobody has counted.
+    double surface_mm2 = kTorsoSurfaceMm2, body_mm3 = kTorsoMm3;
     // Distances that resampling holds, and the most while it measures them, MB (LabelField::need);
     // 0: nobody has counted.
     double held_mb = 0, measured_mb = 0;
-    double region_voxels = 0;       // millions
-    double mesh_voxels = 0;         // those of label_voxels that organ meshes become
-    double lesions = 0, pools = 0;  // numbers of pathologies: of a place, and of free fluid
-    double texture_edge = 64;       // voxels, of the solid textures
-    double labels = kUsualLabels;   // number
-    double sampling_s = 0;          // processor seconds of sampling an analytic body
+    double region_voxels = 0;          // millions
+    double mesh_voxels = 0;            // those of label_voxels that organ meshes become
+    double lesions = 0, pools = 0;     // numbers of pathologies: of a place, and of free fluid
+    double texture_edge = 64;          // voxels, of the solid textures
+    double labels = kUsualLabels;      // number
+    double textures = kUsualTextures;  // number that their tissues name
+    double sampling_s = 0;             // processor seconds of sampling an analytic body
 
     // Millions, in the box of the body, which fills little of that of organ meshes.
     double nodes() const { return std::max(label_voxels - 0.4 * mesh_voxels, interpolated_nodes); }
@@ -183,7 +186,9 @@ struct CaseSize {
         return surfaces > 0 ? surfaces / (kTorsoSurfaces * std::cbrt(nodes() * nodes())) : 1;
     }
     static constexpr double kTorsoSurfaces = 0.2116;
-    static constexpr double kUsualLabels = 60;  // of a torso, where nobody has counted
+    // Of a torso, where nobody has counted.
+    static constexpr double kUsualLabels = 60, kUsualTextures = 14;
+    static constexpr double kTorsoSurfaceMm2 = 3.6e6, kTorsoMm3 = 24e6;
 };
 
 // Cores that a stage's job asks a build farm for, and its peak memory in MB: base + a * MB of the

@@ -161,7 +161,8 @@ EngineOptions engine_options(const PageImage& image,
     options.depth_mm = image.depth_mm;
     options.focus_mm = image.focus_mm;
     options.render.model = image.model;
-    options.render.width_px = options.render.height_px = image.side_px;
+    options.render.width_px = image.width_px;
+    options.render.height_px = image.height_px;
     options.render.effects = exercise.effects;
     options.render.textures = std::move(textures);
     return options;
@@ -219,13 +220,14 @@ const CaseSignature* PagePlayer::check_signature() {
     return signature_->step() ? &signature_->result() : nullptr;
 }
 
-Status PagePlayer::choose_exercise(int index, int side_px) {
+Status PagePlayer::choose_exercise(int index, int width_px, int height_px) {
     const int count = static_cast<int>(exercises_.size());
     const int wanted = (index % count + count) % count;
     const Exercise& exercise = exercises_[wanted];
     PageImage image;
     image.model = exercise.model == "paper" ? ImageModel::paper : ImageModel::physical;
-    image.side_px = side_px;
+    image.width_px = width_px;
+    image.height_px = height_px;
     image.depth_mm = exercise.probe.depth_mm;
     image.focus_mm = exercise.probe.focus_mm;
     const int before = std::exchange(exercise_index_, wanted);
@@ -262,7 +264,7 @@ Status PagePlayer::set_image(const PageImage& image) {
     engine_ = std::move(next);
     truth_.reset();
     image_ = image;
-    pixels_.assign(static_cast<std::size_t>(image.side_px) * image.side_px, std::uint8_t{0});
+    pixels_.assign(static_cast<std::size_t>(image.width_px) * image.height_px, std::uint8_t{0});
     kept_count_ = 0;
     kept_last_s_ = -1;
     if (session_) session_->use(*engine_);
@@ -402,8 +404,8 @@ Point3 PagePlayer::target_in_probe(std::size_t i) const {
 }
 
 std::string PagePlayer::name_at(int column, int row) {
-    if (!engine_->last().tools.has_probe || column < 0 || row < 0 || column >= image_.side_px ||
-        row >= image_.side_px)
+    if (!engine_->last().tools.has_probe || column < 0 || row < 0 || column >= image_.width_px ||
+        row >= image_.height_px)
         return {};
     if (!truth_) {
         auto made = TruthRenderer::create(bundle_, exercise_in_use(), engine_->render_options());

@@ -116,7 +116,7 @@ ScanGeometry doppler_geometry(const ScanEngine& engine);
 // What the engine draws; the console of the page changes it.
 struct PageImage {
     ImageModel model = ImageModel::physical;
-    int side_px = 512;                  // width and height
+    int width_px = 512, height_px = 512;
     double depth_mm = 0, focus_mm = 0;  // 0: the exercise's
 };
 
@@ -160,7 +160,7 @@ class PagePlayer {
 
     // Begins an exercise in its own image: the probe goes to its start, an attempt is dropped.
     // index: taken modulo the number of exercises.
-    Status choose_exercise(int index, int side_px);
+    Status choose_exercise(int index, int width_px, int height_px);
     // Another image of the same exercise; session clock and frame numbers continue.
     Status set_image(const PageImage& image);
     const PageImage& image() const { return image_; }
@@ -194,7 +194,7 @@ class PagePlayer {
     // that time of the attempt; -1: none was kept, and those of the last seconds stay.
     int look_at_attempt(double time_s);
     double kept_age_s(int back) const;  // time from that picture to the newest
-    // # side_px * side_px, of the last picture.
+    // # width_px * height_px, of the last picture.
     std::span<const std::uint8_t> pixels() const { return pixels_; }
 
     // Before frames whose settings ask for a Doppler mode; until then they show none. Error: blood

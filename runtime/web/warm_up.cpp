@@ -60,7 +60,7 @@ CaseBundle warm_up_case() {
 
 std::unique_ptr<PagePlayer> warm_up_player(int side_px) {
     auto player = PagePlayer::of(StreamedBundle(warm_up_case()), "warm-up");
-    if (!player->choose_exercise(0, side_px)) return nullptr;
+    if (!player->choose_exercise(0, side_px, side_px)) return nullptr;
     return player;
 }
 

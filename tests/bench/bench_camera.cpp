@@ -22,7 +22,8 @@ struct Film {
     CameraModel camera = assumed_camera(1280, 720);
     std::vector<MarkerBody> bodies = marker_bodies();
     std::vector<std::vector<std::uint8_t>> pictures;
-    explicit Film(bool with_needle) {
+    // unsteady: the light changes from picture to picture, so that all of it seems to have moved.
+    explicit Film(bool with_needle, bool unsteady = false) {
         testing::MarkerVideo video(camera);
         const double s = std::sin(0.96), c = std::cos(0.96);
         const Vector3 forward{0, c, -s}, right{1, 0, 0};
@@ -42,14 +43,17 @@ struct Film {
             std::vector<testing::PlacedBody> placed{testing::still_body(bodies[2], board),
                                                     {&bodies[0], probe}};
             if (with_needle) placed.push_back({&bodies[1], needle});
-            pictures.push_back(testing::jpeg_of(video.take(placed, i * kPeriodS), 1280, 720, 75));
+            testing::VideoOptions options;
+            if (unsteady && i % 2 == 1) options.brightness = 0.65;
+            pictures.push_back(
+                testing::jpeg_of(video.take(placed, i * kPeriodS, options), 1280, 720, 75));
         }
     }
 };
 
 // The film runs forward and back, so that no tool jumps. good: the share of poses that are good.
-void follow(benchmark::State& state, bool with_needle) {
-    const Film film(with_needle);
+void follow(benchmark::State& state, bool with_needle, bool unsteady = false) {
+    const Film film(with_needle, unsteady);
     Result<GreyJpegReader> reader = GreyJpegReader::create();
     Result<TagDetector> detector = TagDetector::create();
     if (!reader || !detector) {
@@ -77,6 +81,9 @@ void both_tools(benchmark::State& state) {
 void needle_missing(benchmark::State& state) {
     follow(state, false);
 }
+void needle_missing_all_changes(benchmark::State& state) {
+    follow(state, false, true);
+}
 void read_jpeg(benchmark::State& state) {
     const Film film(true);
     Result<GreyJpegReader> reader = GreyJpegReader::create();
@@ -86,6 +93,9 @@ void read_jpeg(benchmark::State& state) {
 }
 BENCHMARK(both_tools)->Name("Camera/picture/both_tools")->Unit(benchmark::kMillisecond);
 BENCHMARK(needle_missing)->Name("Camera/picture/needle_missing")->Unit(benchmark::kMillisecond);
+BENCHMARK(needle_missing_all_changes)
+    ->Name("Camera/picture/needle_missing_all_changes")
+    ->Unit(benchmark::kMillisecond);
 BENCHMARK(read_jpeg)->Name("Camera/picture/jpeg_alone")->Unit(benchmark::kMillisecond);
 
 }  // namespace

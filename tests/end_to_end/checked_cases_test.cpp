@@ -19,6 +19,7 @@
 #include "pipeline/check/check_case.h"
 #include "pipeline/pathology/place_pathology.h"
 #include "support/cooked_case.h"
+#include "support/hard_case.h"
 #include "support/paths.h"
 
 namespace sonocase::pipeline {
@@ -218,14 +219,15 @@ TEST(CheckedCases, HaveNoFaultsAndTenPlantedOnesAreNamed) {
     }
 }
 
-// Liver, spleen and kidney, 20 seeds: half a voxel of 8 mm3 is .2 % of 2 ml; the bar is 1.5 %.
+// Liver, spleen and kidney, 20 seeds: half a voxel of 8 mm3 is .2 % of 2 ml.
 TEST(CheckedCases, LesionsHaveTheVolumeAskedForInEveryBody) {
+    testing::HardCase off("volume of a lesion of 2 ml, off", testing::HardCase::at_most, 0.0021,
+                          "");
     for (const Body& body : kBodies) {
         const CaseBundle* bundle = cooked(body);
         if (bundle == nullptr) continue;
         const LabelVolume volume{bundle->grid, dense_from_bricks(bundle->label_bricks),
                                  bundle->labels};
-        double worst = 0;
         for (int seed = 1; seed <= 20; ++seed) {
             std::vector<PathologyRequest> requests;
             for (const char* host : {"liver", "spleen", "kidney_left"}) {
@@ -245,10 +247,8 @@ TEST(CheckedCases, LesionsHaveTheVolumeAskedForInEveryBody) {
                 place_pathology({volume, {}, volume.labels, tissues, requests, "case.toml", {}});
             ASSERT_TRUE(placed) << body.scenario << ": " << placed.error().message();
             for (const PathologyEntry& entry : placed->key)
-                worst = std::max(worst, std::abs(entry.volume_ml / 2 - 1));
+                off.see(std::abs(entry.volume_ml / 2 - 1));
         }
-        std::printf("%s: lesions within %.2f %%\n", body.scenario, 100 * worst);
-        EXPECT_LE(worst, 0.0021) << body.scenario;
     }
 }
 

@@ -91,6 +91,12 @@ class Picture {
         }
         return start();
     }
+    Rigid scripted(const std::string& name, double time_s) const {
+        for (const Sweep& sweep : exercise_.sweeps)
+            if (sweep.name == name)
+                return runtime::sweep_pose(sweep, time_s, &skin_).mannequin_from_probe;
+        return start();
+    }
     void draw(const Rigid& pose) {
         runtime::FrameInput input;
         input.mannequin_from_probe = pose;
@@ -157,6 +163,50 @@ class Picture {
         return out;
     }
 
+    // Beams that come through liver to a lung, in three parts of the curve between them: its mean
+    // grey by the distance from the gas, over that of the liver before it, where it is highest.
+    struct Dome {
+        int beams = 0;
+        std::array<double, 3> curve{};
+        double behind = 0;
+    };
+    Dome dome() const {
+        constexpr double kWall = 12;  // muscle and fat between liver and lung, at a slope
+        constexpr int kSteps = 30;    // of half a millimetre, to 3 mm into the gas
+        const int liver = label_index("liver"), lung = label_index("lung_right");
+        std::vector<std::pair<int, double>> found;  // beam, depth of the gas
+        for (int b = 0; b < kBeams; ++b) {
+            const double gas = blocked_[static_cast<std::size_t>(b)];
+            const auto label = [&](double depth) {
+                return anatomy_.label(renderer_->at_rest(pose_ * in_beam(b, depth)));
+            };
+            if (gas < exercise_.probe.depth_mm - 16 && label(gas) == lung &&
+                label(gas - kWall) == liver)
+                found.emplace_back(b, gas);
+        }
+        Dome out;
+        out.beams = static_cast<int>(found.size());
+        Moments all, behind;
+        for (std::size_t part = 0; part < 3; ++part) {
+            Moments before;
+            std::array<Moments, kSteps> profile;
+            for (std::size_t n = part * found.size() / 3; n < (part + 1) * found.size() / 3; ++n) {
+                const auto [b, gas] = found[n];
+                for (int k = 0; k < kSteps; ++k) {
+                    const double d = 0.5 * k - kWall;
+                    profile[static_cast<std::size_t>(k)].add(pixel_at(in_beam(b, gas + d)));
+                    before.add(pixel_at(in_beam(b, gas + d - kWall - 3)));
+                    behind.add(pixel_at(in_beam(b, gas + d + kWall + 3)));
+                }
+            }
+            all.add(before.mean());
+            for (const Moments& at : profile)
+                out.curve[part] = std::max(out.curve[part], at.mean() / before.mean());
+        }
+        out.behind = behind.mean() / all.mean();
+        return out;
+    }
+
   private:
     double pixel(int x, int y) const { return pixels_[static_cast<std::size_t>(y * kSize + x)]; }
     int label_index(const std::string& name) const {
@@ -191,6 +241,19 @@ class Picture {
         return r > 1 && r < probe.depth_mm &&
                std::abs(std::atan2(d.x, d.z)) < 0.47 * probe.field_of_view_rad;
     }
+    // A place in the middle of one of kBeams parts of the face.
+    Point3 in_beam(int b, double depth) const {
+        const Probe& probe = exercise_.probe;
+        const double share = (b + 0.5) / kBeams - 0.5;
+        if (probe.shape == ProbeShape::linear) return {share * probe.width_mm, 0, depth};
+        const double angle = share * probe.field_of_view_rad;
+        return apex() + (depth - apex().z) * Vector3{std::sin(angle), 0, std::cos(angle)};
+    }
+    double pixel_at(Point3 in_plane) const {
+        const auto layout = renderer_->layout();
+        return pixel(static_cast<int>(in_plane.x / layout.mm_per_px + layout.origin_x_px),
+                     static_cast<int>(in_plane.z / layout.mm_per_px + layout.origin_y_px));
+    }
     // Place of a point on the face, [0, 1], and its depth.
     std::pair<double, double> on_face(Point3 p) const {
         const Probe& probe = exercise_.probe;
@@ -200,17 +263,10 @@ class Picture {
     }
     // Depth of the first bone or gas under each of kBeams parts of the face.
     void find_shadows() {
-        const Probe& probe = exercise_.probe;
         for (int b = 0; b < kBeams; ++b) {
-            const double share = (b + 0.5) / kBeams - 0.5;
-            const bool linear = probe.shape == ProbeShape::linear;
-            const double angle = linear ? 0 : share * probe.field_of_view_rad;
-            const Vector3 d{std::sin(angle), 0, std::cos(angle)};
-            const Point3 face =
-                linear ? Point3{share * probe.width_mm, 0, 0} : apex() + -apex().z * d;
             double r = 0;
-            while (r < probe.depth_mm && !anatomy_.blocks_sound(anatomy_.label(
-                                             renderer_->at_rest(pose_ * (face + r * d)))))
+            while (r < exercise_.probe.depth_mm && !anatomy_.blocks_sound(anatomy_.label(
+                                                       renderer_->at_rest(pose_ * in_beam(b, r)))))
                 r += 1;
             blocked_[static_cast<std::size_t>(b)] = r;
         }
@@ -301,6 +357,37 @@ TEST(PictureLevels, OfTheRealTorso) {
     if (!fs::exists(data + "/ct/labels.nii.gz")) GTEST_SKIP() << "no " << data;
     measure(testing::cooked_scenario("real-torso/case.toml", "--set resample.voxel_mm=2").path,
             true);
+}
+
+// From below the woman's ribs, up through the liver: a curve without gaps closes the picture, and
+// behind it lies the liver once more, 14 dB weaker: grey, neither black nor as bright.
+TEST(PictureLevels, OfTheWomanWhoseDiaphragmClosesThePicture) {
+    const std::string data = SONOCASE_DATA;
+    if (!fs::exists(data + "/organ_meshes")) GTEST_SKIP() << "no " << data;
+    auto bundle =
+        load_bundle(testing::cooked_scenario("atlas-woman/case.toml",
+                                             "--set import.voxel_mm=2 --set resample.voxel_mm=2")
+                        .path);
+    ASSERT_TRUE(bundle) << bundle.error().message();
+    int domes = 0;
+    for (const EmbeddedExercise& embedded : bundle->exercises) {
+        auto exercise = parse_exercise(embedded.toml, embedded.name);
+        ASSERT_TRUE(exercise) << exercise.error().message();
+        Picture picture(*bundle, *exercise, "modern");
+        picture.draw(picture.start());
+        EXPECT_LE(std::abs(picture.auto_db()), kMaxAutoDb) << embedded.name;
+        if (embedded.name != "diaphragm") continue;
+        picture.draw(picture.scripted("expert", 6));
+        const auto dome = picture.dome();
+        std::printf("beams %d, curve %.2f %.2f %.2f of the liver's grey, behind it %.2f\n",
+                    dome.beams, dome.curve[0], dome.curve[1], dome.curve[2], dome.behind);
+        EXPECT_GE(dome.beams, kBeams / 4);
+        for (const double part : dome.curve) EXPECT_GT(part, 1.3);  // speckle alone: about 1.15
+        EXPECT_GT(dome.behind, 0.2);
+        EXPECT_LT(dome.behind, 0.75);
+        ++domes;
+    }
+    EXPECT_EQ(domes, 1);
 }
 
 }  // namespace

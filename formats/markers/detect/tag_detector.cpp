@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
@@ -88,6 +87,7 @@ struct TagDetector::State {
     void read(const GreyPicture& picture,
               const PictureRegion& region,
               int step,
+              double blur,
               std::vector<SeenTag>& tags) {
         const int x0 = std::max(0, region.x0), y0 = std::max(0, region.y0);
         const int width = std::min(picture.width_px, region.x1) - x0;
@@ -99,6 +99,7 @@ struct TagDetector::State {
                             const_cast<std::uint8_t*>(picture.pixels) +
                                 static_cast<std::ptrdiff_t>(y0) * picture.stride + x0};
         detector->quad_decimate = static_cast<float>(step);
+        detector->quad_sigma = static_cast<float>(blur);
         zarray_t* found = library().detect(detector, &image);
         for (int i = 0; i < zarray_size(found); ++i) {
             apriltag_detection_t* seen = nullptr;
@@ -121,9 +122,14 @@ struct TagDetector::State {
 namespace {
 
 constexpr int kFindStep = 2, kSearchStep = 3;  // pixels
+constexpr double kSharp = 0;
 
 PictureRegion whole(const GreyPicture& picture) {
     return {0, 0, picture.width_px, picture.height_px};
+}
+
+int area_of(const PictureRegion& region) {
+    return (region.x1 - region.x0) * (region.y1 - region.y0);
 }
 
 Pixel middle_of(const SeenTag& tag) {
@@ -174,7 +180,6 @@ Result<TagDetector> TagDetector::create() {
     library().add_family(state->detector, state->family, 1);
     state->detector->nthreads = 1;
     state->detector->quad_decimate = 2;
-    state->detector->quad_sigma = 0;
     state->detector->refine_edges = true;
     state->detector->decode_sharpening = 0.25;
     return TagDetector(std::move(state));
@@ -183,7 +188,7 @@ Result<TagDetector> TagDetector::create() {
 TagFindings TagDetector::find(const GreyPicture& picture) {
     TagFindings out;
     std::vector<SeenTag> tags;
-    state_->read(picture, whole(picture), kFindStep, tags);
+    state_->read(picture, whole(picture), kFindStep, kSharp, tags);
     sort_by_id(tags, out.twice);
     for (SeenTag& tag : tags) {
         if (std::binary_search(out.twice.begin(), out.twice.end(), tag.id)) continue;
@@ -199,8 +204,9 @@ TagFindings TagDetector::find(const GreyPicture& picture) {
 void TagDetector::read(const GreyPicture& picture,
                        const PictureRegion& region,
                        int step,
-                       std::vector<SeenTag>& tags) {
-    state_->read(picture, region, step, tags);
+                       std::vector<SeenTag>& tags,
+                       double blur) {
+    state_->read(picture, region, step, blur, tags);
 }
 
 int TagDetector::count_mirrored(const GreyPicture& picture) {
@@ -213,7 +219,7 @@ int TagDetector::count_mirrored(const GreyPicture& picture) {
     const GreyPicture mirrored{state_->mirrored.data(), picture.width_px, picture.height_px,
                                picture.width_px};
     std::vector<SeenTag> tags;
-    state_->read(mirrored, whole(mirrored), kFindStep, tags);
+    state_->read(mirrored, whole(mirrored), kFindStep, kSharp, tags);
     return static_cast<int>(tags.size());
 }
 
@@ -283,8 +289,7 @@ void PictureFollower::look_at_board(const GreyPicture& picture) {
 void PictureFollower::look_at_tool(const GreyPicture& picture,
                                    MarkerRole role,
                                    const Rigid& camera_from_body) {
-    constexpr double kMargin = 30;     // pixels: what a hand does beside going on as it did
-    constexpr int kSmall = 160 * 160;  // pixels: every one of them is looked at
+    constexpr double kMargin = 30;  // pixels: what a hand does beside going on as it did
     double x0 = 1e9, y0 = 1e9, x1 = -1e9, y1 = -1e9;
     for (const MarkerFace& face : follower_.body(role)->faces)
         for (const Point3& corner : face.corners) {
@@ -301,15 +306,43 @@ void PictureFollower::look_at_tool(const GreyPicture& picture,
     const PictureRegion region{
         clamped(x0 - kMargin, picture.width_px), clamped(y0 - kMargin, picture.height_px),
         clamped(x1 + kMargin, picture.width_px), clamped(y1 + kMargin, picture.height_px)};
-    const int area = (region.x1 - region.x0) * (region.y1 - region.y0);
-    detector_.read(picture, region, area <= kSmall ? 1 : kFindStep, raw_);
+    look_at(picture, region);
+}
+
+void PictureFollower::look_at(const GreyPicture& picture, const PictureRegion& region) {
+    constexpr int kSmall = 160 * 160;  // pixels: every one of them is looked at
+    detector_.read(picture, region, area_of(region) <= kSmall ? 1 : kFindStep, raw_);
+    remember(picture, region);
+}
+
+// Where the rest of a body is whose first tags are read; nothing: none is.
+std::optional<PictureRegion> PictureFollower::around_tags(MarkerRole role,
+                                                          const GreyPicture& picture) const {
+    PictureRegion around{picture.width_px, picture.height_px, 0, 0};
+    for (const SeenTag& tag : raw_) {
+        const TagPlace place = find_tag(follower_.bodies(), tag.id);
+        if (place.body < 0 || follower_.bodies()[place.body].role != role) continue;
+        const Pixel middle = middle_of(tag);
+        const double reach = 2.5 * diagonal_of(tag) + 10;
+        around.x0 = std::min(around.x0, static_cast<int>(middle.x - reach));
+        around.y0 = std::min(around.y0, static_cast<int>(middle.y - reach));
+        around.x1 = std::max(around.x1, static_cast<int>(middle.x + reach));
+        around.y1 = std::max(around.y1, static_cast<int>(middle.y + reach));
+    }
+    const PictureRegion within{std::max(0, around.x0), std::max(0, around.y0),
+                               std::min(picture.width_px, around.x1),
+                               std::min(picture.height_px, around.y1)};
+    // Tags on both sides of the picture are on no one body.
+    if (within.x1 <= within.x0 || area_of(within) > area_of(whole(picture)) / 3) return {};
+    return within;
 }
 
 bool PictureFollower::seen(MarkerRole role, int tags) const {
-    const MarkerBody* body = follower_.body(role);
-    for (const std::vector<SeenTag>* list : {&raw_, &fitted_})
-        for (const SeenTag& tag : *list)
-            for (const MarkerTag& drawn : body->tags) tags -= drawn.id == tag.id;
+    const auto is_in = [](const std::vector<SeenTag>& list, int id) {
+        return std::any_of(list.begin(), list.end(), [&](const SeenTag& t) { return t.id == id; });
+    };
+    for (const MarkerTag& drawn : follower_.body(role)->tags)
+        tags -= is_in(raw_, drawn.id) || is_in(fitted_, drawn.id);
     return tags <= 0;
 }
 
@@ -335,17 +368,143 @@ void PictureFollower::note_twice() {
             twice_.insert(std::lower_bound(twice_.begin(), twice_.end(), id), id);
 }
 
+// Of every so many pixels along both axes, so that there are some 320 across.
+int PictureFollower::sample_step(const GreyPicture& picture) {
+    constexpr int kAcross = 320;
+    return std::max(1, picture.width_px / kAcross);
+}
+
+void PictureFollower::remember(const GreyPicture& picture, const PictureRegion& region) {
+    const int step = sample_step(picture);
+    const int columns = (picture.width_px + step - 1) / step;
+    const int rows = (picture.height_px + step - 1) / step;
+    searched_.resize(static_cast<std::size_t>(columns) * rows);
+    const int x0 = (std::max(0, region.x0) + step - 1) / step;
+    const int y0 = (std::max(0, region.y0) + step - 1) / step;
+    const int x1 = (std::min(picture.width_px, region.x1) + step - 1) / step;
+    const int y1 = (std::min(picture.height_px, region.y1) + step - 1) / step;
+    for (int y = y0; y < y1; ++y) {
+        const std::uint8_t* row =
+            picture.pixels + static_cast<std::ptrdiff_t>(y) * step * picture.stride;
+        std::uint8_t* kept = searched_.data() + static_cast<std::ptrdiff_t>(y) * columns;
+        for (int x = x0; x < x1; ++x) kept[x] = row[x * step];
+    }
+}
+
+// Boxes round what no longer looks as it did when it was last searched: tiles of 20 x 20 samples
+// that touch each other make one.
+std::vector<PictureRegion> PictureFollower::changed(const GreyPicture& picture) const {
+    constexpr int kTile = 20;
+    // Lamps flicker by a twentieth and more, and cameras have noise: what differs by less than this
+    // and an eighth of its brightness has not changed.
+    constexpr int kLeast = 12, kFlicker = 8;
+    constexpr int kFew = kTile * kTile / 40;  // samples; of a narrow tag there are sixteen
+    const int step = sample_step(picture);
+    const int columns = (picture.width_px + step - 1) / step;
+    const int rows = (picture.height_px + step - 1) / step;
+    const int across = (columns + kTile - 1) / kTile, down = (rows + kTile - 1) / kTile;
+    std::vector<int> differ(static_cast<std::size_t>(across) * down);
+    for (int y = 0; y < rows; ++y) {
+        const std::uint8_t* row =
+            picture.pixels + static_cast<std::ptrdiff_t>(y) * step * picture.stride;
+        const std::uint8_t* kept = searched_.data() + static_cast<std::ptrdiff_t>(y) * columns;
+        int* tiles = differ.data() + static_cast<std::ptrdiff_t>(y / kTile) * across;
+        for (int tile = 0; tile < across; ++tile) {
+            int count = 0;
+            for (int x = tile * kTile; x < std::min(columns, (tile + 1) * kTile); ++x)
+                count += std::abs(row[x * step] - kept[x]) > kLeast + kept[x] / kFlicker;
+            tiles[tile] += count;
+        }
+    }
+    std::vector<PictureRegion> boxes;
+    std::vector<int> open;
+    for (int first = 0; first < across * down; ++first) {
+        if (differ[first] < kFew) continue;
+        PictureRegion box{across, down, 0, 0};
+        open.assign(1, first);
+        differ[first] = 0;
+        while (!open.empty()) {
+            const int x = open.back() % across, y = open.back() / across;
+            open.pop_back();
+            box = {std::min(box.x0, x), std::min(box.y0, y), std::max(box.x1, x + 1),
+                   std::max(box.y1, y + 1)};
+            for (int v = std::max(0, y - 1); v <= std::min(down - 1, y + 1); ++v)
+                for (int u = std::max(0, x - 1); u <= std::min(across - 1, x + 1); ++u) {
+                    if (differ[v * across + u] < kFew) continue;
+                    differ[v * across + u] = 0;
+                    open.push_back(v * across + u);
+                }
+        }
+        const int side = kTile * step;
+        boxes.push_back({box.x0 * side, box.y0 * side, std::min(box.x1 * side, picture.width_px),
+                         std::min(box.y1 * side, picture.height_px)});
+    }
+    return boxes;
+}
+
+// What changed since it was last searched is searched at once, for what was hidden and is shown
+// changes the picture; and one cell of the picture after another, where change did not show it.
+// Where more than a third changed, as where the camera moves, a third is searched, then the next.
+void PictureFollower::search(const GreyPicture& picture) {
+    constexpr int kOverlap = 40;  // pixels: a tag of 80 lies wholly within one of two neighbours
+    constexpr int kAlign = 8;     // pixels: a tag is then read as it is in the whole picture
+    // Noise and cloth have edges as well, most of which a blur before the search removes: half the
+    // time, and of a hundred bodies that are found without it two are not.
+    constexpr double kBlur = 0.8;  // in steps
+    const auto grown = [&](const PictureRegion& r) {
+        return PictureRegion{std::max(0, r.x0 - kOverlap) / kAlign * kAlign,
+                             std::max(0, r.y0 - kOverlap) / kAlign * kAlign,
+                             std::min(picture.width_px, r.x1 + kOverlap),
+                             std::min(picture.height_px, r.y1 + kOverlap)};
+    };
+    const int all = area_of(whole(picture));
+    std::vector<PictureRegion> regions = changed(picture);
+    int area = 0;
+    for (const PictureRegion& r : regions) area += area_of(grown(r));
+    const double blur = area > all / 5 ? kBlur : kSharp;
+    if (area > all / 3) {
+        regions = {{0, picture.height_px * part_ / kParts, picture.width_px,
+                    picture.height_px * (part_ + 1) / kParts}};
+        part_ = (part_ + 1) % kParts;
+    } else if (area <= all / 8) {
+        const int column = cell_ % kCellsAcross, row = cell_ / kCellsAcross;
+        regions.push_back({picture.width_px * column / kCellsAcross,
+                           picture.height_px * row / kCellsDown,
+                           picture.width_px * (column + 1) / kCellsAcross,
+                           picture.height_px * (row + 1) / kCellsDown});
+        cell_ = (cell_ + 1) % (kCellsAcross * kCellsDown);
+    }
+    for (const PictureRegion& part : regions) {
+        const PictureRegion region = grown(part);
+        std::erase_if(foreign_, [&](Pixel p) {
+            return p.x >= region.x0 && p.y >= region.y0 && p.x < region.x1 && p.y < region.y1;
+        });
+        read_all(picture, region, blur);
+        remember(picture, part);
+    }
+}
+
+// Notes which of the tags are on none of our sheets.
+void PictureFollower::read_all(const GreyPicture& picture,
+                               const PictureRegion& region,
+                               double blur) {
+    const std::size_t before = raw_.size();
+    detector_.read(picture, region, kFindStep, raw_, blur);
+    for (std::size_t k = before; k < raw_.size(); ++k)
+        if (find_tag(follower_.bodies(), raw_[k].id).body < 0)
+            foreign_.push_back(middle_of(raw_[k]));
+}
+
 FollowerPicture PictureFollower::follow(const GreyPicture& picture, double time_s) {
     constexpr MarkerRole kTools[] = {MarkerRole::probe, MarkerRole::needle};
-    constexpr int kSearchEvery = 4;                   // pictures, while everything is in view
-    constexpr int kEnoughTags = 2;                    // of a body
-    constexpr int kOverlap = 40;                      // pixels: by which parts overlap
-    constexpr int kFineParts = 6, kFineOverlap = 20;  // large tags are found at large steps
-    constexpr int kLongMissing = 30;                  // pictures
-    constexpr double kPauseS = 0.15;                  // where a tool is by then is not known
+    constexpr int kSearchEvery = 4;   // pictures, while everything is in view
+    constexpr int kEnoughTags = 2;    // of a body
+    constexpr double kPauseS = 0.15;  // where a tool is by then is not known
     ++picture_;
-    const bool begins = time_s - last_s_ > kPauseS;
+    const bool begins = time_s - last_s_ > kPauseS || picture.width_px != width_px_ ||
+                        picture.height_px != height_px_;
     last_s_ = time_s;
+    width_px_ = picture.width_px, height_px_ = picture.height_px;
     if (begins) places_ = {};
     raw_.clear(), fitted_.clear(), twice_.clear();
     look_at_board(picture);
@@ -355,51 +514,22 @@ FollowerPicture PictureFollower::follow(const GreyPicture& picture, double time_
         if (!follower_.body(kTools[t])) continue;
         if (const std::optional<Rigid> pose = follower_.expected(kTools[t], time_s))
             look_at_tool(picture, kTools[t], *pose);
+        // Too few tags, or on no such body: it is not followed, and nothing there changes.
+        if (unposed_[t] && !begins && !seen(kTools[t], 1)) look_at(picture, *unposed_[t]);
         missed[t] = !seen(kTools[t], kEnoughTags);
         missing = missing || missed[t];
     }
-    bool lately = !missing || begins;  // something that was in view a second ago is missing
-    for (int t = 0; t < 2; ++t) {
-        missed_for_[t] = missed[t] ? missed_for_[t] + 1 : 0;
-        lately = lately || (missed[t] && missed_for_[t] < kLongMissing);
-    }
     if (begins) {
-        detector_.read(picture, whole(picture), kFindStep, raw_);
-        foreign_ = {};
-        for (const SeenTag& tag : raw_)
-            foreign_[0] += find_tag(follower_.bodies(), tag.id).body < 0;
+        foreign_.clear();
+        read_all(picture, whole(picture), kSharp);
+        remember(picture, whole(picture));
     } else if (missing || picture_ % kSearchEvery == 0) {
-        // A third at large steps. What has been missing for long may be too far away for these:
-        // then sixths at small steps follow.
-        const int round = lately ? 0 : static_cast<int>(picture_ % (kParts + kFineParts));
-        const bool fine = round >= kParts;
-        if (!fine) part_ = (part_ + 1) % kParts;
-        const int index = fine ? round - kParts : part_, parts = fine ? kFineParts : kParts;
-        const int overlap = fine ? kFineOverlap : kOverlap;
-        const PictureRegion part{0, picture.height_px * index / parts - overlap, picture.width_px,
-                                 picture.height_px * (index + 1) / parts + overlap};
-        const std::size_t before = raw_.size();
-        detector_.read(picture, part, fine ? kFindStep : kSearchStep, raw_);
-        int foreign = 0;
-        for (std::size_t k = before; k < raw_.size(); ++k)
-            foreign += find_tag(follower_.bodies(), raw_[k].id).body < 0;
-        if (!fine) foreign_[part_] = foreign;
+        search(picture);
         // The first tag of a body shows where to look more closely.
-        for (int t = 0; t < 2; ++t) {
-            if (!missed[t]) continue;
-            PictureRegion around{picture.width_px, picture.height_px, 0, 0};
-            for (std::size_t k = before; k < raw_.size(); ++k) {
-                const TagPlace place = find_tag(follower_.bodies(), raw_[k].id);
-                if (place.body < 0 || follower_.bodies()[place.body].role != kTools[t]) continue;
-                const Pixel middle = middle_of(raw_[k]);
-                const double reach = 2.5 * diagonal_of(raw_[k]) + 10;
-                around.x0 = std::min(around.x0, static_cast<int>(middle.x - reach));
-                around.y0 = std::min(around.y0, static_cast<int>(middle.y - reach));
-                around.x1 = std::max(around.x1, static_cast<int>(middle.x + reach));
-                around.y1 = std::max(around.y1, static_cast<int>(middle.y + reach));
-            }
-            if (around.x1 > 0) detector_.read(picture, around, kFindStep, raw_);
-        }
+        for (int t = 0; t < 2; ++t)
+            if (missed[t] && !seen(kTools[t], kEnoughTags))
+                if (const auto around = around_tags(kTools[t], picture))
+                    detector_.read(picture, *around, kFindStep, raw_);
     }
     any_tags_ = !raw_.empty() || !fitted_.empty();
     // Those that are laid over the picture already come first, and stay.
@@ -429,8 +559,14 @@ FollowerPicture PictureFollower::follow(const GreyPicture& picture, double time_
         unbend_tag(follower_.camera(), tag);
         fitted_.push_back(tag);
     }
-    return follower_.follow(fitted_, twice_, std::accumulate(foreign_.begin(), foreign_.end(), 0),
-                            time_s);
+    const FollowerPicture out =
+        follower_.follow(fitted_, twice_, static_cast<int>(foreign_.size()), time_s);
+    for (int t = 0; t < 2; ++t) {
+        unposed_[t].reset();
+        if (out.tools[t].status == MarkerStatus::lost)
+            unposed_[t] = around_tags(kTools[t], picture);
+    }
+    return out;
 }
 
 }  // namespace sonocase

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
@@ -21,6 +22,7 @@ namespace {
 // bodies after a rigid alignment: overlap as such is neither rewarded nor penalised.
 constexpr double kNoCounterpartMm = 12;
 constexpr double kScoreScaleMm = 10;
+constexpr double kSlidOff = 0.5;  // share of the readings that another pose reaches
 // Poses nearer to each other are one.
 constexpr double kSamePoseRad = 20 * kPi / 180, kSamePoseMm = 40;
 
@@ -299,11 +301,17 @@ Vector3 facing_shift(const Pair& pair, const Matrix3& rotation) {
     return count > 0 ? sum / count : Vector3{};
 }
 
-// The best candidates that differ clearly from each other, at most max_count.
+// The best candidates that differ clearly from each other, at most max_count. Those that have slid
+// off the readings come last: where bodies differ by more than a missing counterpart costs, they
+// have the lowest scores of all.
 std::vector<RigidCandidate> distinct(std::vector<RigidCandidate> all, int max_count) {
-    std::stable_sort(all.begin(), all.end(), [](const RigidCandidate& a, const RigidCandidate& b) {
-        return a.score_mm < b.score_mm;
-    });
+    double most = 0;
+    for (const RigidCandidate& c : all) most = std::max(most, c.coverage);
+    std::stable_sort(
+        all.begin(), all.end(), [most](const RigidCandidate& a, const RigidCandidate& b) {
+            const bool a_off = a.coverage < kSlidOff * most, b_off = b.coverage < kSlidOff * most;
+            return a_off == b_off ? a.score_mm < b.score_mm : b_off;
+        });
     std::vector<RigidCandidate> chosen;
     for (const RigidCandidate& c : all) {
         if (static_cast<int>(chosen.size()) >= max_count) break;
@@ -454,21 +462,38 @@ ceres::CostFunction* automatic(const Cost& cost) {
     return new ceres::AutoDiffCostFunction<Cost, Sizes...>(new Cost(cost));
 }
 
-}  // namespace
-
 constexpr int kSureRounds = 4;  // rounds of matching that no pose slides away in
+// Poses are rounded to these, which are wide against what lies between two that rest (0.1 mm and
+// 1e-4) and narrow against the body.
+constexpr double kRoundedMm = 2, kRoundedCosine = 0.01;
+constexpr double kSameCost = 1.01;  // a second descent that ends higher than this is not taken
 
-Rigid refine_rigid_robust(const SkinModel& skin,
-                          const TargetSurface& target,
-                          const Rigid& start,
-                          const PoseHints& hints,
-                          double loss_mm,
-                          int rounds) {
+// How near a descent comes to where it rests.
+struct Nearness {
+    double angle_rad, shift_mm;
+    double cost;  // share of it that the solver stops at
+};
+constexpr Nearness kNear{1e-4, 0.02, 1e-6}, kExact{1e-5, 2e-3, 1e-10};
+
+struct Settled {
+    Rigid pose;
+    double cost = INFINITY;  // half the sum of the robust gaps; of no pose that slid
+    bool slid = false;       // it lost counterparts; the pose is that of before
+};
+
+Settled settle(const SkinModel& skin,
+               const TargetSurface& target,
+               std::span<const std::uint32_t> readings,
+               const Rigid& start,
+               const PoseHints& hints,
+               double loss_mm,
+               int rounds,
+               const Nearness& nearness) {
     Rigid pose = start;
-    const std::vector<std::uint32_t> readings = thin_target(target, 1.2 * target.spacing_mm);
     const std::size_t stride = std::max<std::size_t>(1, skin.points.size() / 1200);
     std::size_t counterparts = 0;
     Rigid sure = start;  // the pose while every reading that has a counterpart keeps it
+    double cost = INFINITY;
     for (int round = 0; round < rounds; ++round) {
         MatchOptions gates;
         gates.farthest_mm = 60;
@@ -477,13 +502,13 @@ Rigid refine_rigid_robust(const SkinModel& skin,
         const Matches matches = find_matches(skin, mapped.points, mapped.normals, mapped.index,
                                              target, readings, stride, gates);
         const std::size_t found = matches.from_target.size() + matches.from_skin.size();
-        if (found < 30) return sure;
+        if (found < 30) return {sure, INFINITY, true};
         // A pose that loses counterparts from round to round slides off the body.
         if (round == kSureRounds) counterparts = found;
         if (round <= kSureRounds) sure = pose;
         if (round > kSureRounds &&
             static_cast<double>(found) < 0.98 * static_cast<double>(counterparts))
-            return sure;
+            return {sure, INFINITY, true};
         double turn[3] = {0, 0, 0};
         double shift[3] = {pose.translation.x, pose.translation.y, pose.translation.z};
         ceres::Problem problem;
@@ -517,20 +542,51 @@ Rigid refine_rigid_robust(const SkinModel& skin,
         ceres::Solver::Options options;
         options.linear_solver_type = ceres::DENSE_QR;
         options.max_num_iterations = 8;
+        options.function_tolerance = nearness.cost;
         options.num_threads = 1;  // the order of summation affects the result
         options.logging_type = ceres::SILENT;
         ceres::Solver::Summary summary;
         ceres::Solve(options, &problem, &summary);
-        if (!summary.IsSolutionUsable()) return pose;
+        if (!summary.IsSolutionUsable()) return {pose, cost};
+        cost = summary.final_cost;
         const Vector3 axis{turn[0], turn[1], turn[2]};
         const Rigid next{
             nearest_rotation(rotation_about(normalized(axis), norm(axis)) * pose.rotation),
             {shift[0], shift[1], shift[2]}};
-        const bool at_rest = same_pose(next, pose, 1e-4, 0.02);
+        const bool at_rest = same_pose(next, pose, nearness.angle_rad, nearness.shift_mm);
         pose = next;
         if (at_rest) break;
     }
-    return pose;
+    return {pose, cost};
+}
+
+// The nearest pose of a lattice in the readings' own axes.
+Rigid rounded(const Rigid& pose, const Matrix3& axes) {
+    const auto rounded = [](Vector3 v, double step) {
+        for (int a = 0; a < 3; ++a) v[a] = step * std::round(v[a] / step);
+        return v;
+    };
+    const Matrix3 to_axes = transpose(axes), turn = to_axes * pose.rotation;
+    return {nearest_rotation(axes * Matrix3::from_columns(rounded(turn.column(0), kRoundedCosine),
+                                                          rounded(turn.column(1), kRoundedCosine),
+                                                          rounded(turn.column(2), kRoundedCosine))),
+            axes * rounded(to_axes * pose.translation, kRoundedMm)};
+}
+
+}  // namespace
+
+Rigid refine_rigid_robust(const SkinModel& skin,
+                          const TargetSurface& target,
+                          const Rigid& start,
+                          const PoseHints& hints,
+                          double loss_mm,
+                          int rounds) {
+    const std::vector<std::uint32_t> readings = thin_target(target, 1.2 * target.spacing_mm);
+    const Settled near = settle(skin, target, readings, start, hints, loss_mm, rounds, kNear);
+    if (near.slid) return near.pose;
+    const Settled exact = settle(skin, target, readings, rounded(near.pose, axes_of(target)), hints,
+                                 loss_mm, rounds, kExact);
+    return exact.cost <= kSameCost * near.cost ? exact.pose : near.pose;
 }
 
 }  // namespace sonocase::pipeline::inline registration_fit

@@ -38,6 +38,7 @@ struct TruthRenderer::Impl {
     void lay_out_rows(const Rigid& pose);
     void planes_of(const FrameInput& input, const TruthPlanes& planes);
     void labels(const TruthPlanes& planes);
+    void darken(const TruthRun& run, int begin, int end);
     void shadows(const TruthPlanes& planes);
     void count_shadowed(const std::uint8_t* shadowed,
                         const std::uint8_t* labels,
@@ -74,6 +75,7 @@ struct TruthRenderer::Impl {
 namespace {
 
 constexpr float kNoHardMm = 1e9f;
+constexpr std::uint64_t kEachByte = 0x0101010101010101u;
 
 bool valid_pose(const Rigid& t) {
     return is_finite(t) && orthonormality_error(t.rotation) < 1e-3 && determinant(t.rotation) > 0;
@@ -206,10 +208,9 @@ void TruthRenderer::Impl::lay_out_rows(const Rigid& pose) {
 }
 
 void TruthRenderer::Impl::labels(const TruthPlanes& planes) {
-    std::span<float> dark;
-    if (!planes.shadowed.empty()) dark = first_hard_mm;
-    std::fill(dark.begin(), dark.end(), kNoHardMm);
-    tiles.find(simd, rows, dark.empty());
+    const bool dark = !planes.shadowed.empty();
+    std::fill(first_hard_mm.begin(), first_hard_mm.end(), kNoHardMm);
+    tiles.find(simd, rows);
     pixels.for_each_run([&](const TruthRun& run, std::size_t at) {
         std::uint8_t* to = planes.labels.data() + at;
         for (int n = 0; n < run.count;) {
@@ -218,17 +219,43 @@ void TruthRenderer::Impl::labels(const TruthPlanes& planes) {
             do end += PlainTiles::kColumns - (run.begin + end) % PlainTiles::kColumns;
             while (end < run.count && tiles.label(run.begin + end, run.row) == label);
             end = std::min(end, run.count);
-            if (label < 0) {
-                truth_labels(simd, rows, run, n, end, to, truth.pixels_of_label.data(), dark,
-                             pixels.rays_per_px_at_face());
-            } else {
+            if (label < 0)
+                truth_labels(simd, rows, run, n, end, to);
+            else
                 std::fill(to + n, to + end, static_cast<std::uint8_t>(label));
-                truth.pixels_of_label[label] += static_cast<std::uint32_t>(end - n);
+            n = end;
+        }
+        // Runs of one label, mostly long.
+        for (int n = 0; n < run.count;) {
+            const std::uint8_t label = to[n];
+            int end = n + 1;
+            for (std::uint64_t shown = 0; end + 8 <= run.count; end += 8) {
+                std::memcpy(&shown, to + end, 8);
+                if (shown != kEachByte * label) break;
             }
+            while (end < run.count && to[end] == label) ++end;
+            truth.pixels_of_label[label] += static_cast<std::uint32_t>(end - n);
+            if (dark && (rows.labels[label] & kHard) != 0) darken(run, n, end);
             n = end;
         }
         depths(planes, run, at);  // while its rays and depths are at hand
     });
+}
+
+// Makes the rays that hard pixels [begin, end) of a run cover dark from them on.
+void TruthRenderer::Impl::darken(const TruthRun& run, int begin, int end) {
+    const int rays = pixels.rays();
+    for (int n = begin; n < end; ++n) {
+        const float r = run.r_mm[n];
+        const int ray = run.ray[n];
+        const float away =
+            rows.fan ? std::max(rows.radius_mm + r, 1e-3f) / std::max(rows.radius_mm, 1e-3f) : 1.0f;
+        // So many to each side that no ray between two hard pixels stays bright.
+        const int half =
+            std::max(static_cast<int>(0.5f * pixels.rays_per_px_at_face() / away + 0.499f), 0);
+        for (int i = std::max(ray - half, 0); i <= std::min(ray + half, rays - 1); ++i)
+            first_hard_mm[i] = std::min(first_hard_mm[i], r);
+    }
 }
 
 void TruthRenderer::Impl::shadows(const TruthPlanes& planes) {
@@ -259,14 +286,13 @@ void TruthRenderer::Impl::shadows(const TruthPlanes& planes) {
 void TruthRenderer::Impl::count_shadowed(const std::uint8_t* shadowed,
                                          const std::uint8_t* labels,
                                          std::size_t count) {
-    constexpr std::uint64_t kEach = 0x0101010101010101u;
     for (std::size_t n = 0; n < count; n += 8) {
         std::uint64_t dark = 0, shown = 0;
         const std::size_t left = std::min<std::size_t>(8, count - n);
         std::memcpy(&dark, shadowed + n, left);
         if (dark == 0) continue;
         std::memcpy(&shown, labels + n, left);
-        if (dark == kEach && shown == kEach * labels[n]) {  // true nearly everywhere
+        if (dark == kEachByte && shown == kEachByte * labels[n]) {  // true nearly everywhere
             truth.shadowed_pixels_of_label[labels[n]] += 8;
             continue;
         }

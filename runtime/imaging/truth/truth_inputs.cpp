@@ -29,36 +29,31 @@ const std::int32_t* words_of(const T& values) {
 TruthVolume::TruthVolume(const BrickVolume<std::uint8_t>& labels,
                          const BrickVolume<std::uint32_t>& boundary)
     : labels_(labels), boundary_(boundary) {
-    // At least one, so that a vector in which no brick is uniform has something to read.
     boundary_uniform_.assign(boundary.uniform.begin(), boundary.uniform.end());
+    const auto none = kUniformBrick | static_cast<std::uint32_t>(boundary_uniform_.size());
     boundary_uniform_.push_back(kNoBoundary);
     for (const std::uint32_t record : boundary.uniform)
         plain_boundaries_ = plain_boundaries_ && record == kNoBoundary;
-    bricks_.resize(labels.table.size());
-    for (std::size_t n = 0; n < bricks_.size(); ++n) {
-        const std::uint32_t entry = labels.table[n];
-        if (!(entry & kUniformBrick)) {
-            bricks_[n] = static_cast<std::int32_t>(entry);
-            continue;
-        }
-        std::uint32_t word = kOneLabel | labels.uniform[entry & ~kUniformBrick];
-        if (!boundary.table.empty()) {
-            const std::uint32_t record = boundary.table[n];
-            if (!(record & kUniformBrick) ||
-                boundary.uniform[record & ~kUniformBrick] != kNoBoundary)
-                word |= kHasSurface;
-        }
-        bricks_[n] = static_cast<std::int32_t>(word);
+    bricks_.resize(labels.table.size() + 1, {kOneLabel, none});
+    for (std::size_t n = 0; n < labels.table.size(); ++n) {
+        TruthBrick& brick = bricks_[n];
+        if (!boundary.table.empty()) brick.boundary = boundary.table[n];
+        brick.word = labels.table[n];
+        if (!(brick.word & kUniformBrick)) continue;
+        brick.word = kOneLabel | labels.uniform[brick.word & ~kUniformBrick];
+        if (!(brick.boundary & kUniformBrick) ||
+            boundary_uniform_[brick.boundary & ~kUniformBrick] != kNoBoundary)
+            brick.word |= kHasSurface;
     }
 }
 
 void TruthVolume::fill(TruthFrameRows& f) const {
     f.bricks = bricks_.data();
+    f.outside = static_cast<std::int32_t>(bricks_.size() - 1);
     f.label_pool = words_of(labels_.pool);
-    const bool surfaces = !boundary_.table.empty();
-    f.boundary_table = surfaces ? words_of(boundary_.table) : nullptr;
-    f.boundary_pool = surfaces ? words_of(boundary_.pool) : nullptr;
-    f.boundary_uniform = plain_boundaries_ ? nullptr : words_of(boundary_uniform_);
+    f.boundary_pool = words_of(boundary_.pool);
+    f.boundary_uniform = words_of(boundary_uniform_);
+    f.plain_boundaries = plain_boundaries_;
     const Int3 bricks = brick_count(labels_.size);
     f.bricks_x = bricks.x;
     f.bricks_xy = bricks.x * bricks.y;
@@ -67,33 +62,33 @@ void TruthVolume::fill(TruthFrameRows& f) const {
 
 TruthVoxels::TruthVoxels(const CaseBundle& bundle, bool physical)
     : bundle_(&bundle), volume_(bundle.label_bricks, bundle.boundary) {
-    // A palette has 255 entries at most; 256 let a look-up of any byte stay inside.
-    constexpr std::size_t kBytes = 256;
     if (physical && bundle.region)
         region_.emplace(bundle.region->label_bricks, bundle.region->boundary);
-    swells_.assign(kBytes, 0);
-    hard_.assign(kBytes, 0);
+    // A palette has 255 entries at most; 256 let a look-up of any byte stay inside.
+    labels_.resize(256);
+    for (std::size_t i = 0; i < labels_.size(); ++i) labels_[i] = static_cast<std::int32_t>(i);
     const std::vector<int> tissues = tissue_of_label(bundle);
     for (std::size_t i = 0; i < bundle.labels.size(); ++i) {
         const Tissue& tissue = bundle.tissues[tissues[i]];
-        swells_[i] = is_artery(bundle.labels[i].name)                     ? 1
-                     : mechanics_of(tissue, bundle.labels[i].name).drains ? 2
-                                                                          : 0;
-        hard_[i] = physical ? tissue.kind == TissueKind::bone || tissue.kind == TissueKind::gas
-                            : tissue.casts_shadow;
+        if (is_artery(bundle.labels[i].name))
+            labels_[i] |= kArtery;
+        else if (mechanics_of(tissue, bundle.labels[i].name).drains)
+            labels_[i] |= kVein;
+        if (physical ? tissue.kind == TissueKind::bone || tissue.kind == TissueKind::gas
+                     : tissue.casts_shadow)
+            labels_[i] |= kHard;
     }
 }
 
 void TruthVoxels::fill(TruthFrameRows& f, TruthFrameRows& region) const {
     volume_.fill(f);
     f.label_count = static_cast<std::int32_t>(bundle_->labels.size());
-    f.swells = swells_.data();
-    f.hard = hard_.data();
+    f.labels = labels_.data();
     f.region = nullptr;
     if (!region_) return;
     region_->fill(region);
     region.label_count = f.label_count;
-    region.swells = f.swells;
+    region.labels = f.labels;
     const RegionPlace place = region_place(*bundle_->region, bundle_->grid);
     for (int a = 0; a < 3; ++a) {
         f.region_lower[a] = static_cast<float>(place.lower_vx[a]);
@@ -158,7 +153,7 @@ PlainTiles::PlainTiles(const ScanGeometry& g, const TruthPixels& pixels, double 
                 1e-6 * (1 - end));
 }
 
-void PlainTiles::find(SimdTarget simd, const TruthFrameRows& f, bool hard_too) {
+void PlainTiles::find(SimdTarget simd, const TruthFrameRows& f) {
     constexpr double kSlackVx = 0.05;  // more than places lose in single precision
     const double column = 0.5 * (kColumns - 1), row = 0.5 * (kRows - 1);
     for (std::size_t n = 0; n < tiles_.size(); ++n) {
@@ -175,7 +170,7 @@ void PlainTiles::find(SimdTarget simd, const TruthFrameRows& f, bool hard_too) {
         if (!move(simd, f, n, box)) continue;
         if (f.weight != nullptr) breathe(f, box);
         const int label = label_in(f, box);
-        if (label < 0 || (!hard_too && f.hard[label] != 0)) continue;
+        if (label < 0) continue;
         if (f.press != nullptr && f.closed_label[label] != label) continue;
         label_[n] = static_cast<std::int16_t>(label);
     }
@@ -295,7 +290,7 @@ int PlainTiles::label_in(const TruthFrameRows& f, const Box& box) {
         if (meets) return -1;
     }
     const auto brick = [&](int i, int j, int k) {
-        return static_cast<std::uint32_t>(f.bricks[k * f.bricks_xy + j * f.bricks_x + i]);
+        return f.bricks[k * f.bricks_xy + j * f.bricks_x + i].word;
     };
     const std::uint32_t first = brick(from[0], from[1], from[2]);
     if ((first & (kOneLabel | kHasSurface)) != kOneLabel) return -1;

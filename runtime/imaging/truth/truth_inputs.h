@@ -28,8 +28,8 @@ class TruthVolume {
   private:
     const BrickVolume<std::uint8_t>& labels_;
     const BrickVolume<std::uint32_t>& boundary_;
-    std::vector<std::uint32_t> boundary_uniform_;
-    std::vector<std::int32_t> bricks_;
+    std::vector<std::uint32_t> boundary_uniform_;  // and kNoBoundary
+    std::vector<TruthBrick> bricks_;               // and one for all places outside
     bool plain_boundaries_ = true;
 };
 
@@ -45,7 +45,7 @@ class TruthVoxels {
 
   private:
     const CaseBundle* bundle_;
-    std::vector<std::int32_t> swells_, hard_;
+    std::vector<std::int32_t> labels_;
     TruthVolume volume_;
     std::optional<TruthVolume> region_;
 };
@@ -97,8 +97,7 @@ class PlainTiles {
 
     PlainTiles(const ScanGeometry& geometry, const TruthPixels& pixels, double contact_reach_mm);
 
-    // Finds those of a frame. hard_too: also of tissue that casts a shadow.
-    void find(SimdTarget simd, const TruthFrameRows& frame, bool hard_too);
+    void find(SimdTarget simd, const TruthFrameRows& frame);  // those of a frame
     // The label that a pixel's tile shows throughout; -1: it may show several.
     int label(int column, int row) const {
         return label_[static_cast<std::size_t>((row / kRows) * across_ + column / kColumns)];

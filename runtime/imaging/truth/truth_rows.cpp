@@ -5,6 +5,7 @@
 #include <hwy/cache_control.h>
 
 #include <algorithm>
+#include <cstddef>
 
 #include "formats/volume/boundary_record.h"
 #include "formats/volume/brick_volume.h"
@@ -197,30 +198,28 @@ HWY_INLINE I side_of_surface(D d, const TruthFrameRows& f, I record, I own, cons
     const auto along = hn::Add(hn::Mul(nu, off.x), hn::Add(hn::Mul(nv, off.y), hn::Mul(nz, off.z)));
     auto side = hn::Add(hn::Mul(signed_byte<1>(d, record), hn::Set(d, 1.0f / 48)),
                         hn::Div(along, hn::Sqrt(square)));
-    if (f.pulse_vx != 0) {
-        const auto pulse = hn::Set(d, f.pulse_vx);
-        const auto one = hn::Set(di, 1);
-        const auto swells = hn::Eq(hn::GatherIndex(di, f.swells, own), one);
-        const auto yields = hn::AndNot(
-            swells, hn::Eq(hn::GatherIndex(di, f.swells, hn::IfThenElseZero(near, second)), one));
-        side = hn::Add(side, hn::IfThenElseZero(hn::RebindMask(d, swells), pulse));
-        side = hn::Sub(side, hn::IfThenElseZero(hn::RebindMask(d, yields), pulse));
-    }
-    if (f.vein_vx != 0) {
-        const auto wall = hn::Set(d, f.vein_vx);
-        const auto two = hn::Set(di, 2);
-        const auto inside = hn::Eq(hn::GatherIndex(di, f.swells, own), two);
-        const auto beside = hn::AndNot(
-            inside, hn::Eq(hn::GatherIndex(di, f.swells, hn::IfThenElseZero(near, second)), two));
-        side = hn::Add(side, hn::IfThenElseZero(hn::RebindMask(d, inside), wall));
-        side = hn::Sub(side, hn::IfThenElseZero(hn::RebindMask(d, beside), wall));
+    // Walls of vessels move outwards, seen from both sides of them.
+    if (f.pulse_vx != 0 || f.vein_vx != 0) {
+        const auto first = hn::GatherIndex(di, f.labels, own);
+        const auto other = hn::GatherIndex(di, f.labels, second);
+        const auto wall = [&](std::int32_t bit, float shift_vx) HWY_ATTR {
+            const auto is = [&](I label) HWY_ATTR {
+                return hn::RebindMask(d, hn::Ne(hn::And(label, hn::Set(di, bit)), hn::Zero(di)));
+            };
+            const auto shift = hn::Set(d, shift_vx);
+            const auto inside = is(first), beside = hn::AndNot(inside, is(other));
+            side = hn::Add(side, hn::IfThenElseZero(inside, shift));
+            side = hn::Sub(side, hn::IfThenElseZero(beside, shift));
+        };
+        if (f.pulse_vx != 0) wall(kArtery, f.pulse_vx);
+        if (f.vein_vx != 0) wall(kVein, f.vein_vx);
     }
     const auto beyond = hn::And(near, hn::RebindMask(di, hn::Lt(side, hn::Zero(d))));
     return hn::IfThenElse(beyond, second, own);
 }
 
-// The voxels nearest to points: brick, cell in it (-1: outside the volume, where brick is 0), and
-// the points relative to the voxels' centres.
+// The voxels nearest to points: brick and cell in it, and the points relative to the voxels'
+// centres.
 template <class D>
 struct Voxels {
     IntOf<D> brick, cell;
@@ -242,110 +241,92 @@ HWY_INLINE Voxels<D> voxels_of(D d, const TruthFrameRows& f, const Places<D>& p)
     };
     const auto inside = hn::RebindMask(di, hn::And(in(i, 0), hn::And(in(j, 1), in(k, 2))));
     const auto three = hn::Set(di, 3);
-    const I brick = hn::IfThenElseZero(
-        inside, hn::Add(hn::ShiftRight<2>(i),
-                        hn::Add(hn::Mul(hn::ShiftRight<2>(j), hn::Set(di, f.bricks_x)),
-                                hn::Mul(hn::ShiftRight<2>(k), hn::Set(di, f.bricks_xy)))));
-    const I cell = hn::Or(hn::And(i, three), hn::Or(hn::ShiftLeft<2>(hn::And(j, three)),
-                                                    hn::ShiftLeft<4>(hn::And(k, three))));
-    return {brick,
-            hn::IfThenElse(inside, cell, hn::Set(di, -1)),
+    const I brick = hn::Add(hn::ShiftRight<2>(i),
+                            hn::Add(hn::Mul(hn::ShiftRight<2>(j), hn::Set(di, f.bricks_x)),
+                                    hn::Mul(hn::ShiftRight<2>(k), hn::Set(di, f.bricks_xy))));
+    return {hn::IfThenElse(inside, brick, hn::Set(di, f.outside)),
+            hn::Or(hn::And(i, three), hn::Or(hn::ShiftLeft<2>(hn::And(j, three)),
+                                             hn::ShiftLeft<4>(hn::And(k, three)))),
             {hn::Sub(p.x, hn::Sub(hx, shift)), hn::Sub(p.y, hn::Sub(hy, shift)),
              hn::Sub(p.z, hn::Sub(hz, shift))}};
 }
 
-// What the tables hold for bricks.
+// What the table holds for bricks.
 template <class D>
-struct Entries {
-    IntOf<D> word, record;
+struct Bricks {
+    IntOf<D> word, boundary;
 };
 template <class D, class I>
-HWY_INLINE Entries<D> entries_of(D, const TruthFrameRows& f, I brick) {
+HWY_INLINE Bricks<D> bricks_of(D, const TruthFrameRows& f, I brick) {
+    static_assert(sizeof(TruthBrick) == 8 && offsetof(TruthBrick, boundary) == 4);
     const hn::RebindToSigned<D> di;
-    const auto word = hn::GatherIndex(di, f.bricks, brick);
+    const auto* table = reinterpret_cast<const std::int32_t*>(f.bricks);
+    const auto word = hn::GatherIndex(di, table, hn::Add(brick, brick));
     const auto plain = hn::Set(di, static_cast<std::int32_t>(kOneLabel));
     const auto marks = hn::Set(di, static_cast<std::int32_t>(kOneLabel | kHasSurface));
-    if (f.boundary_table == nullptr || hn::AllTrue(di, hn::Eq(hn::And(word, marks), plain)))
-        return {word, word};
-    return {word, hn::GatherIndex(di, f.boundary_table, brick)};
+    // Bricks of one label and no surface: most of a body.
+    if (hn::AllTrue(di, hn::Eq(hn::And(word, marks), plain))) return {word, plain};
+    return {word, hn::GatherIndex(di, table + 1, hn::Add(brick, brick))};
 }
 
 template <class D>
-HWY_INLINE IntOf<D> labels_of(D d,
-                              const TruthFrameRows& f,
-                              const Voxels<D>& v,
-                              const Entries<D>& entries) {
+HWY_INLINE IntOf<D> labels_of(
+    D d, const TruthFrameRows& f, const Bricks<D>& bricks, IntOf<D> cell, const Places<D>& off) {
     const hn::RebindToSigned<D> di;
     using I = IntOf<D>;
-    const I word = entries.word;
-    const auto inside = hn::Not(hn::Lt(v.cell, hn::Zero(di)));
-    const I cell = hn::And(v.cell, hn::Set(di, 63));
-    const I own = hn::And(word, hn::Set(di, 0xFF));
-    const auto mixed = hn::Not(hn::Lt(word, hn::Zero(di)));
-    // Bricks of one label and no surface: most of a body.
-    const auto plain = hn::AndNot(
-        mixed,
-        hn::Eq(hn::And(word, hn::Set(di, static_cast<std::int32_t>(kHasSurface))), hn::Zero(di)));
-    if (hn::AllFalse(di, hn::AndNot(plain, inside))) return hn::IfThenElseZero(inside, own);
-    I label = own;
+    const I word = bricks.word, zero = hn::Zero(di);
+    I label = hn::And(word, hn::Set(di, 0xFF));
+    const auto marks = hn::Set(di, static_cast<std::int32_t>(kOneLabel | kHasSurface));
+    const auto plain = hn::Set(di, static_cast<std::int32_t>(kOneLabel));
+    if (hn::AllTrue(di, hn::Eq(hn::And(word, marks), plain))) return label;
+    const auto mixed = hn::Not(hn::Lt(word, zero));
     if (!hn::AllFalse(di, mixed)) {
         const I at = hn::IfThenElseZero(mixed, hn::Or(hn::ShiftLeft<6>(word), cell));
-        label =
-            hn::IfThenElse(mixed, hn::And(pool_byte(di, f.label_pool, at), hn::Set(di, 0xFF)), own);
+        label = hn::IfThenElse(mixed, hn::And(pool_byte(di, f.label_pool, at), hn::Set(di, 0xFF)),
+                               label);
     }
-    label = hn::IfThenElseZero(inside, label);
-    if (f.boundary_table == nullptr) return label;
-    const I entry = entries.record;
-    const auto alike = hn::Lt(entry, hn::Zero(di));
-    const I none = hn::Set(di, static_cast<std::int32_t>(kNoBoundary));
-    I record = none;
-    if (f.boundary_uniform != nullptr) {
-        const I low = hn::And(entry, hn::Set(di, 0x7FFFFFFF));
-        record = hn::GatherIndex(di, f.boundary_uniform, hn::IfThenElseZero(alike, low));
-    }
-    const auto stored = hn::AndNot(alike, inside);
+    const I low = hn::And(bricks.boundary, hn::Set(di, 0x7FFFFFFF));
+    const auto stored = hn::Not(hn::Lt(bricks.boundary, zero));
+    I record = hn::Set(di, static_cast<std::int32_t>(kNoBoundary));
+    if (!f.plain_boundaries)
+        record = hn::GatherIndex(di, f.boundary_uniform, hn::IfThenZeroElse(stored, low));
     if (!hn::AllFalse(di, stored)) {
-        const I at = hn::IfThenElseZero(stored, hn::Or(hn::ShiftLeft<6>(entry), cell));
+        const I at = hn::IfThenElseZero(stored, hn::Or(hn::ShiftLeft<6>(low), cell));
         record = hn::IfThenElse(stored, hn::GatherIndex(di, f.boundary_pool, at), record);
     }
-    record = hn::IfThenElse(inside, record, none);
-    return side_of_surface(d, f, record, label, v.off);
+    return side_of_surface(d, f, record, label, off);
 }
 
-// A stretch of a run, on its way from places to labels. Tables and pools lie far apart in memory: a
+// A stretch of a run, on its way from places to labels. Table and pools lie far apart in memory: a
 // vector that waits for each in turn takes twice as long as one whose numbers were asked for while
 // others were worked on.
 constexpr int kStretch = 128;
 struct Stretch {
     HWY_ALIGN float x[kStretch + kMaxLanes], y[kStretch + kMaxLanes], z[kStretch + kMaxLanes];
     HWY_ALIGN std::int32_t brick[kStretch + kMaxLanes], cell[kStretch + kMaxLanes],
-        word[kStretch + kMaxLanes], record[kStretch + kMaxLanes], state[kStretch + kMaxLanes];
+        word[kStretch + kMaxLanes], boundary[kStretch + kMaxLanes], state[kStretch + kMaxLanes];
 };
 constexpr std::int32_t kInAir = 1, kClosed = 2;  // of Stretch::state
 
 // A voxel is wider than two pixels.
 constexpr int kAskEvery = 4;
-inline void ask_for_entries(const TruthFrameRows& f, const Stretch& s, int begin, int end) {
-    for (int n = begin; n < end; n += kAskEvery) {
-        hwy::Prefetch(f.bricks + s.brick[n]);
-        if (f.boundary_table != nullptr) hwy::Prefetch(f.boundary_table + s.brick[n]);
-    }
+inline void ask_for_bricks(const TruthFrameRows& f, const Stretch& s, int begin, int end) {
+    for (int n = begin; n < end; n += kAskEvery) hwy::Prefetch(f.bricks + s.brick[n]);
 }
 inline void ask_for_voxels(const TruthFrameRows& f, const Stretch& s, int begin, int end) {
     for (int n = begin; n < end; n += kAskEvery) {
-        const auto cell = static_cast<std::uint32_t>(s.cell[n] & 63);
+        const auto cell = static_cast<std::uint32_t>(s.cell[n]);
         const auto word = static_cast<std::uint32_t>(s.word[n]),
-                   record = static_cast<std::uint32_t>(s.record[n]);
+                   boundary = static_cast<std::uint32_t>(s.boundary[n]);
         if (s.word[n] >= 0) hwy::Prefetch(f.label_pool + (word << 4 | cell >> 2));
-        if (s.record[n] >= 0 && f.boundary_table != nullptr)
-            hwy::Prefetch(f.boundary_pool + (static_cast<std::size_t>(record) << 6 | cell));
+        if (s.boundary[n] >= 0)
+            hwy::Prefetch(f.boundary_pool + (static_cast<std::size_t>(boundary) << 6 | cell));
     }
 }
 
 // The label that the fine region holds where it covers a point, and `label` elsewhere.
 template <class D, class I>
-HWY_INLINE I labels_of_region(D d, const TruthFrameRows& f, const Places<D>& p, I label) {
-    if (f.region == nullptr) return label;
+HWY_NOINLINE I labels_of_region(D d, const TruthFrameRows& f, const Places<D>& p, I label) {
     auto here = hn::Eq(p.x, p.x);
     const auto own = [&](auto at, int a) HWY_ATTR {
         here = hn::And(here, hn::And(hn::Ge(at, hn::Set(d, f.region_lower[a])),
@@ -357,47 +338,13 @@ HWY_INLINE I labels_of_region(D d, const TruthFrameRows& f, const Places<D>& p, 
     const auto mask = hn::RebindMask(hn::RebindToSigned<D>(), here);
     const Voxels<D> voxels = voxels_of(d, *f.region, place);
     return hn::IfThenElse(
-        mask, labels_of(d, *f.region, voxels, entries_of(d, *f.region, voxels.brick)), label);
+        mask,
+        labels_of(d, *f.region, bricks_of(d, *f.region, voxels.brick), voxels.cell, voxels.off),
+        label);
 }
 
-// Makes the rays that a hard pixel covers dark from it on.
-template <class D, class I>
-HWY_INLINE void darken(D,
-                       const TruthFrameRows& f,
-                       const TruthRun& run,
-                       int first,
-                       int used,
-                       I label,
-                       float rays_per_px_at_face,
-                       std::span<float> first_hard_mm) {
-    const hn::RebindToSigned<D> di;
-    const I hard = hn::GatherIndex(di, f.hard, label);
-    HWY_ALIGN std::int32_t is_hard[kMaxLanes];
-    hn::Store(hard, di, is_hard);
-    const int rays = static_cast<int>(first_hard_mm.size());
-    for (int lane = 0; lane < used; ++lane) {
-        if (is_hard[lane] == 0) continue;
-        const float r = run.r_mm[first + lane];
-        const int ray = run.ray[first + lane];
-        const float away =
-            f.fan ? std::max(f.radius_mm + r, 1e-3f) / std::max(f.radius_mm, 1e-3f) : 1.0f;
-        // So many to each side that no ray between two hard pixels stays bright.
-        const int half = std::max(static_cast<int>(0.5f * rays_per_px_at_face / away + 0.499f), 0);
-        for (int n = std::max(ray - half, 0); n <= std::min(ray + half, rays - 1); ++n) {
-            float& dark = first_hard_mm[n];
-            dark = std::min(dark, r);
-        }
-    }
-}
-
-void labels_of_run(const TruthFrameRows& f,
-                   const TruthRun& run,
-                   int begin,
-                   int end,
-                   std::uint8_t* labels,
-                   std::uint32_t* count_of_label,
-                   std::span<float> first_hard_mm,
-                   float rays_per_px_at_face) {
+void labels_of_run(
+    const TruthFrameRows& f, const TruthRun& run, int begin, int end, std::uint8_t* labels) {
     using D = hn::ScalableTag<float>;
     const D d;
     const hn::RebindToSigned<D> di;
@@ -435,25 +382,30 @@ void labels_of_run(const TruthFrameRows& f,
             }
             if (f.weight != nullptr) breathe_back(d, f, p);
             const Voxels<D> voxels = voxels_of(d, f, p);
-            hn::Store(p.x, d, s.x + at), hn::Store(p.y, d, s.y + at), hn::Store(p.z, d, s.z + at);
+            // A fine region is looked up from the places themselves.
+            const Places<D>& kept = f.region != nullptr ? p : voxels.off;
+            hn::Store(kept.x, d, s.x + at);
+            hn::Store(kept.y, d, s.y + at);
+            hn::Store(kept.z, d, s.z + at);
             hn::Store(voxels.brick, di, s.brick + at);
             hn::Store(voxels.cell, di, s.cell + at);
             hn::Store(state, di, s.state + at);
-            ask_for_entries(f, s, at, at + used);
+            ask_for_bricks(f, s, at, at + used);
         }
         for (int at = 0; at < to - from; at += lanes) {
-            const Entries<D> entries = entries_of(d, f, hn::Load(di, s.brick + at));
-            hn::Store(entries.word, di, s.word + at);
-            hn::Store(entries.record, di, s.record + at);
+            const Bricks<D> bricks = bricks_of(d, f, hn::Load(di, s.brick + at));
+            hn::Store(bricks.word, di, s.word + at);
+            hn::Store(bricks.boundary, di, s.boundary + at);
             ask_for_voxels(f, s, at, std::min(at + lanes, to - from));
         }
         for (int first = from; first < to; first += lanes) {
             const int used = std::min(lanes, to - first), at = first - from;
             const Places<D> p{hn::Load(d, s.x + at), hn::Load(d, s.y + at), hn::Load(d, s.z + at)};
+            const Places<D> off = f.region != nullptr ? voxels_of(d, f, p).off : p;
             auto label =
-                labels_of(d, f, voxels_of(d, f, p),
-                          Entries<D>{hn::Load(di, s.word + at), hn::Load(di, s.record + at)});
-            label = labels_of_region(d, f, p, label);
+                labels_of(d, f, Bricks<D>{hn::Load(di, s.word + at), hn::Load(di, s.boundary + at)},
+                          hn::Load(di, s.cell + at), off);
+            if (f.region != nullptr) label = labels_of_region(d, f, p, label);
             const auto state = hn::Load(di, s.state + at);
             if (!hn::AllTrue(di, hn::Eq(state, hn::Zero(di)))) {
                 const auto is = [&](std::int32_t bit) HWY_ATTR {
@@ -464,21 +416,14 @@ void labels_of_run(const TruthFrameRows& f,
                                            label);
                 label = hn::IfThenElse(is(kInAir), hn::Zero(di), label);
             }
-            HWY_ALIGN std::uint8_t bytes[kMaxLanes];
-            hn::Store(hn::DemoteTo(d8, label), d8, bytes);
-            std::copy_n(bytes, used, labels + first);
-            // Few labels meet in a vector: each is counted at once.
-            auto left = hn::FirstN(di, static_cast<std::size_t>(used));
-            std::int32_t any_hard = 0;
-            do {
-                const std::uint8_t value = bytes[hn::FindKnownFirstTrue(di, left)];
-                const auto same = hn::And(left, hn::Eq(label, hn::Set(di, value)));
-                count_of_label[value] += static_cast<std::uint32_t>(hn::CountTrue(di, same));
-                any_hard |= f.hard[value];
-                left = hn::AndNot(same, left);
-            } while (!hn::AllFalse(di, left));
-            if (any_hard != 0 && !first_hard_mm.empty())
-                darken(d, f, run, first, used, label, rays_per_px_at_face, first_hard_mm);
+            const auto bytes = hn::DemoteTo(d8, label);
+            if (used == lanes) {
+                hn::StoreU(bytes, d8, labels + first);
+            } else {
+                HWY_ALIGN std::uint8_t rest[kMaxLanes];
+                hn::Store(bytes, d8, rest);
+                std::copy_n(rest, used, labels + first);
+            }
         }
     }
 }
@@ -576,13 +521,8 @@ void truth_labels(SimdTarget simd,
                   const TruthRun& run,
                   int begin,
                   int end,
-                  std::uint8_t* labels,
-                  std::uint32_t* count_of_label,
-                  std::span<float> first_hard_mm,
-                  float rays_per_px_at_face) {
-    HWY_DISPATCH_TABLE(labels_of_run)
-    [simd.index](frame, run, begin, end, labels, count_of_label, first_hard_mm,
-                 rays_per_px_at_face);
+                  std::uint8_t* labels) {
+    HWY_DISPATCH_TABLE(labels_of_run)[simd.index](frame, run, begin, end, labels);
 }
 
 PressRange press_range(SimdTarget simd,

@@ -12,7 +12,17 @@
 
 namespace sonocase::runtime {
 
+// What the tables hold for a brick, side by side: both are wanted at the same time.
+struct TruthBrick {
+    // An entry of the labels' table where the brick holds several labels, else kOneLabel | label,
+    // and kHasSurface where one of its voxels has a record.
+    std::uint32_t word = 0;
+    std::uint32_t boundary = 0;  // the entry of the table of boundary records
+};
 inline constexpr std::uint32_t kOneLabel = 0x80000000u, kHasSurface = 0x100u;
+
+// What a label is, in the bits above its number.
+inline constexpr std::int32_t kArtery = 0x100, kVein = 0x200, kHard = 0x400;  // casts a shadow
 
 // What all rows of a frame share. Coordinates are voxels of the bundle's grid.
 struct TruthFrameRows {
@@ -20,17 +30,16 @@ struct TruthFrameRows {
     double origin[3], across[3], down[3];
     std::int32_t size[3];
 
-    // Voxels of the bundle. bricks: one word each, an entry of the labels' table where the brick
-    // holds several labels, else kOneLabel | kHasSurface | label. The others are BrickVolume's;
-    // null boundary_table: no surfaces; null boundary_uniform: each of its values is kNoBoundary.
-    const std::int32_t *bricks, *label_pool;
-    const std::int32_t *boundary_table, *boundary_pool, *boundary_uniform;
-    std::int32_t bricks_x, bricks_xy;
+    // Voxels of the bundle. bricks: x fastest, and one more for all places outside. The pools and
+    // boundary_uniform are BrickVolume's.
+    const TruthBrick* bricks;
+    std::int32_t bricks_x, bricks_xy, outside;  // number of the brick for places outside
+    const std::int32_t *label_pool, *boundary_pool, *boundary_uniform;
+    bool plain_boundaries = false;  // each value of boundary_uniform is kNoBoundary
     std::int32_t label_count;
+    const std::int32_t* labels;  // # 256: each number, and the bits of what it is
     float pulse_vx = 0;          // outward shift of arterial walls
     float vein_vx = 0;           // of the walls of veins
-    const std::int32_t* swells;  // # labels: 1 for arteries, 2 for veins
-    const std::int32_t* hard;    // # labels: 1 for what casts a shadow
 
     // The fine region, with its own size, words and pulse; null: none. Its box, and its voxel
     // coordinates: per_voxel * those of the case + first.
@@ -74,18 +83,13 @@ struct TruthRun {
     const float* r_mm = nullptr;         // depth along the beam; likewise
 };
 
-// Writes labels of the run's pixels [begin, end), counts them, and lowers first_hard_mm (# rays, or
-// empty) of the rays whose pixels are hard. labels: of the whole run. rays_per_px_at_face: rays
-// within a pixel's width where the beams leave the probe.
+// Writes labels of the run's pixels [begin, end). labels: of the whole run.
 void truth_labels(SimdTarget simd,
                   const TruthFrameRows& frame,
                   const TruthRun& run,
                   int begin,
                   int end,
-                  std::uint8_t* labels,
-                  std::uint32_t* count_of_label,
-                  std::span<float> first_hard_mm,
-                  float rays_per_px_at_face);
+                  std::uint8_t* labels);
 
 // shadowed[i] = r > first_hard_mm[ray].
 void truth_shadows(SimdTarget simd,

@@ -163,6 +163,7 @@ void draw_steps(Ui& ui, Box& room, const TaskCardInput& input) {
 void draw_values(Ui& ui, Box& room, const TaskCardInput& input) {
     const FrameRecord& record = input.record;
     const bool needle = input.live && record.tools.has_needle;
+    const bool asks_for_needle = needle || input.exercise.kind != "scan";
     const Point3 tip = record.needle.mannequin_from_drawn * Point3{0, 0, 0};
     const float below = below_values(ui, room.w, input);
     const auto row = [&](const char* name, const std::string& value, unsigned packed) {
@@ -179,14 +180,14 @@ void draw_values(Ui& ui, Box& room, const TaskCardInput& input) {
     if (needle && input.exercise.needle.make->echogenic && room.h >= 34)
         draw_small(ui, room, tr(input.exercise.needle.make->about), kRow);
     if (!input.attempt) {
-        if (input.exam) return;
+        if (input.exam || !asks_for_needle) return;
         row("Needle depth",
             needle && record.needle.depth_mm > 0 ? text("%.0f mm", record.needle.depth_mm) : "–",
             colour::kText);
         return;
     }
     const AttemptView view = input.attempt->view();
-    if (!input.exam) {
+    if (!input.exam && asks_for_needle) {
         const bool inside = needle && view.depth_mm > 0;
         const bool seen = inside && view.tip_in_view;
         row("Tip in view",
@@ -197,7 +198,8 @@ void draw_values(Ui& ui, Box& room, const TaskCardInput& input) {
             : seen  ? colour::kGood
                     : colour::kWarn);
     }
-    row("Skin punctures", std::to_string(view.insertions), colour::kText);
+    if (asks_for_needle || view.insertions > 0)
+        row("Skin punctures", std::to_string(view.insertions), colour::kText);
     if (view.in_no_go && !input.exam && room.h >= 20) {
         const Box line = room.take_top(22, 4);
         ui.icon(Icon::warn, line.x, line.y + 2, 18, colour::kBad);

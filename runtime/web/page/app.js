@@ -300,7 +300,8 @@ class App {
         this.exercise = (index % count + count) % count;
         this.show('scan');
         try {
-            this.core.choose_exercise(this.exercise, this.scan.side());
+            const {width, height} = this.scan.size();
+            this.core.choose_exercise(this.exercise, width, height);
             performance.mark('exercise-chosen');
         } catch (error) {
             this.show('start');
@@ -562,7 +563,7 @@ const app = new App();
 globalThis.sonoplay = {
     app,
     words: {missing: missing_words},
-    // The last picture: {side, pixels: Uint8Array of grey}.
-    frame: () => ({side: app.scan.values.side, pixels: app.core.pixels().slice()}),
+    // The last picture: {width, height, pixels: Uint8Array of grey}.
+    frame: () => ({width: app.scan.values.width, height: app.scan.values.height, pixels: app.core.pixels().slice()}),
 };
 app.start().finally(() => app.work_offline());

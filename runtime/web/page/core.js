@@ -7,7 +7,7 @@ import {t} from './words.js';
 
 // The values that the program returns, in the order of exports.cpp.
 export const kValues = [
-    'side', 'mm_per_px', 'origin_x', 'origin_y', 'depth_mm', 'focus_mm', 'model_paper', 'has_needle',
+    'width', 'height', 'mm_per_px', 'origin_x', 'origin_y', 'depth_mm', 'focus_mm', 'model_paper', 'has_needle',
     'needle_depth_mm', 'in_contact', 'press_mm', 'kept', 'attempt', 'seconds', 'insertions',
     'targets_hit', 'tip_to_target_mm', 'tip_in_view', 'in_no_go', 'damaged', 'frame_number',
     'missing', 'segments_left', 'has_flow', 'machine_hz', 'sound_hz', 'beats', 'psv', 'edv', 'resistive_index', 'flow'];
@@ -122,9 +122,9 @@ export class Core {
     }
     // A little of the check of the author's signature: null until it is done.
     check_signature() { return this.calls.check_signature() ? JSON.parse(this.text()) : null; }
-    choose_exercise(index, side_px) { this.check(this.calls.choose_exercise(index, side_px)); }
-    set_image({model_paper, side, depth_mm, focus_mm}) {
-        this.check(this.calls.set_image(model_paper ? 1 : 0, side, depth_mm, focus_mm));
+    choose_exercise(index, width, height = width) { this.check(this.calls.choose_exercise(index, width, height)); }
+    set_image({model_paper, width, height, depth_mm, focus_mm}) {
+        this.check(this.calls.set_image(model_paper ? 1 : 0, width, height, depth_mm, focus_mm));
     }
     set_console({gain_db, range_db, tgc_db, flip}) {
         this.calls.set_console(gain_db, range_db, flip ? 1 : 0);
@@ -141,13 +141,13 @@ export class Core {
     }
     // A view of the program's memory, valid until the next call.
     pixels() {
-        const side = this.values().side;
-        return new Uint8Array(this.memory.buffer, this.calls.pixels(), side * side);
+        const {width, height} = this.values();
+        return new Uint8Array(this.memory.buffer, this.calls.pixels(), width * height);
     }
     // The same as words of a screen: red, green, blue, 255.
     screen() {
-        const side = this.values().side;
-        return new Uint32Array(this.memory.buffer, this.calls.screen(), side * side);
+        const {width, height} = this.values();
+        return new Uint32Array(this.memory.buffer, this.calls.screen(), width * height);
     }
     // probe, needle: 16 numbers, rows of mannequin_from_...; needle may be null. states: of both, by kToolStates. tracker:
     // of kTrackers, as a recording names it.
@@ -191,8 +191,8 @@ export class Core {
     }
     // Views of the program's memory as pixels(); null where the last picture has no such part.
     overlay() {
-        const at = this.calls.overlay(), side = this.values().side;
-        return at ? new Uint8Array(this.memory.buffer, at, side * side) : null;
+        const at = this.calls.overlay(), {width, height} = this.values();
+        return at ? new Uint8Array(this.memory.buffer, at, width * height) : null;
     }
     strip(width, height) {
         const at = this.calls.strip(width, height);

@@ -4,7 +4,7 @@
 
 import {t} from './words.js';
 
-const kWhite = '#e6e8ea';
+const kWhite = '#e6e8ea', kScaleRoom = 44;  // px beside the picture for the depth scale
 
 export class Picture {
     constructor(box, canvas, overlay) {
@@ -15,32 +15,39 @@ export class Picture {
         this.grey = new Uint32Array(256).map((unused, grey) => 0xff000000 | grey << 16 | grey << 8 | grey);  // of a strip
     }
 
-    // Side of the picture in pixels of the screen, for the room that the page has.
-    wanted_side() {
-        const {width, height} = this.box.getBoundingClientRect();
-        const side = Math.min(width - 44, height) * devicePixelRatio;
-        return Math.max(256, Math.min(1024, 64 * Math.round(side / 64)));
+    // Width and height of the picture in pixels of the screen, for the room that the page has: a fan is wider than high, and
+    // fills it. At most 1024 x 1024 pixels, in steps of 32.
+    wanted_size() {
+        const {width, height} = this.box.getBoundingClientRect(), high = Math.max(64, height);
+        const wide = Math.max(high / 2, Math.min(width - kScaleRoom, 2 * high));
+        const ratio = Math.min(devicePixelRatio, 1024 / Math.sqrt(wide * high));
+        const px = (css) => Math.max(256, 32 * Math.floor(css * ratio / 32));
+        return {width: px(wide), height: px(high)};
     }
     // strip: part of the height, at the bottom, that is not the picture's
-    place(side, strip = 0) {
+    place(values, strip = 0) {
         const {width, height} = this.box.getBoundingClientRect();
         this.room = (1 - strip) * height;
-        this.css_side = Math.max(64, Math.min(width - 44, this.room));
+        this.css_per_px = Math.max(64, Math.min((width - kScaleRoom) / values.width, this.room / values.height) * values.width) / values.width;
+        this.css_width = this.css_per_px * values.width;
+        this.css_height = this.css_per_px * values.height;
         this.canvas.style.top = `${this.room / 2}px`;
-        if (this.canvas.width !== side) this.canvas.width = this.canvas.height = side;
-        this.image = this.context.createImageData(side, side);
+        if (this.canvas.width !== values.width || this.canvas.height !== values.height)
+            Object.assign(this.canvas, {width: values.width, height: values.height});
+        this.image = this.context.createImageData(values.width, values.height);
         this.words = new Uint32Array(this.image.data.buffer);
         // The picture lies in the middle, less the room that the depth scale takes.
-        this.left = Math.max(0, Math.min((width - this.css_side) / 2, width - this.css_side - 44));
+        this.left = Math.max(0, Math.min((width - this.css_width) / 2, width - this.css_width - kScaleRoom));
         this.canvas.style.left = `${this.left}px`;
-        this.canvas.style.width = this.canvas.style.height = `${this.css_side}px`;
+        this.canvas.style.width = `${this.css_width}px`;
+        this.canvas.style.height = `${this.css_height}px`;
         this.overlay.width = Math.round(width * devicePixelRatio);
         this.overlay.height = Math.round(height * devicePixelRatio);
         this.overlay.style.width = `${width}px`;
         this.overlay.style.height = `${height}px`;
     }
 
-    // screen: # side * side of red, green, blue, 255; overlay: indices into colours, 0 for grey, or null
+    // screen: # width * height of red, green, blue, 255; overlay: indices into colours, 0 for grey, or null
     show(screen, overlay, colours) {
         const {words} = this;
         words.set(screen);
@@ -50,7 +57,7 @@ export class Picture {
 
     // Place in the scan plane, mm from the middle of the face, of a point of the window.
     mm_at(client_x, client_y, values) {
-        const rect = this.canvas.getBoundingClientRect(), px = values.side / rect.width;
+        const rect = this.canvas.getBoundingClientRect(), px = values.width / rect.width;
         return {x: ((client_x - rect.left) * px - values.origin_x) * values.mm_per_px,
                 z: ((client_y - rect.top) * px - values.origin_y) * values.mm_per_px};
     }
@@ -63,10 +70,10 @@ export class Picture {
         to.setTransform(ratio, 0, 0, ratio, 0, 0);
         const height = this.overlay.height / ratio;
         to.clearRect(0, 0, this.overlay.width / ratio, height);
-        const per_mm = this.css_side / values.side / values.mm_per_px;
-        const left = this.left, top = (this.room - this.css_side) / 2;
-        const x_of = (mm) => left + values.origin_x * this.css_side / values.side + mm * per_mm;
-        const y_of = (mm) => top + values.origin_y * this.css_side / values.side + mm * per_mm;
+        const per_mm = this.css_per_px / values.mm_per_px;
+        const left = this.left, top = (this.room - this.css_height) / 2;
+        const x_of = (mm) => left + values.origin_x * this.css_per_px + mm * per_mm;
+        const y_of = (mm) => top + values.origin_y * this.css_per_px + mm * per_mm;
         to.font = '13px "Noto Sans", "DejaVu Sans", sans-serif';
         const line = (x0, y0, x1, y1) => {
             for (const [style, thick] of [['#000', 3], [kWhite, 1]]) {
@@ -85,7 +92,7 @@ export class Picture {
             to.fillStyle = kWhite;
             to.fillText(text, x, y);
         };
-        const scale_x = left + this.css_side + 6;
+        const scale_x = left + this.css_width + 6;
         for (let cm = 0; cm * 10 <= values.depth_mm + 0.5; ++cm) {
             const y = y_of(10 * cm), is_fifth = cm % 5 === 0;
             line(scale_x, y, scale_x + (is_fifth ? 10 : 5), y);
@@ -102,7 +109,7 @@ export class Picture {
         measures.forEach(([a, b], n) => {
             line(x_of(flip * a.x), y_of(a.z), x_of(flip * b.x), y_of(b.z));
             const mm = Math.hypot(a.x - b.x, a.z - b.z);
-            say(`${n + 1}: ${mm.toFixed(1)} mm`, left + 8, top + this.css_side - 10 - 18 * (measures.length - 1 - n));
+            say(`${n + 1}: ${mm.toFixed(1)} mm`, left + 8, top + this.css_height - 10 - 18 * (measures.length - 1 - n));
         });
         for (const {x, y, z, radius} of targets) {
             if (z <= 0) continue;

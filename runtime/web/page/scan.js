@@ -177,20 +177,20 @@ export class ScanPage {
         this.touched();
     }
     shown() { return this.running && !$('scan').hidden; }
-    side() { return this.picture.wanted_side(); }
+    size() { return this.picture.wanted_size(); }
 
-    // The side follows the window once it has stopped changing.
+    // The size follows the window once it has stopped changing.
     fit_later() {
         if (!this.shown()) return;
-        this.picture.place(this.values.side, this.doppler.strip_part());
+        this.picture.place(this.values, this.doppler.strip_part());
         clearTimeout(this.fitting);
         this.fitting = setTimeout(() => this.shown() && this.fit(), 150);
     }
     fit() {
-        const side = this.side();
-        if (side !== this.values.side) this.core.set_image({...this.values, side});
+        const {width, height} = this.size();
+        if (width !== this.values.width || height !== this.values.height) this.core.set_image({...this.values, width, height});
         this.values = this.core.values();
-        this.picture.place(this.values.side, this.doppler.strip_part());
+        this.picture.place(this.values, this.doppler.strip_part());
         this.touched();
     }
 
@@ -370,7 +370,7 @@ export class ScanPage {
     name_there() {
         const at = this.hands.pointer;
         if (!at || this.exam() || this.measuring) return null;
-        const rect = $('picture').getBoundingClientRect(), px = this.values.side / rect.width;
+        const rect = $('picture').getBoundingClientRect(), px = this.values.width / rect.width;
         const name = this.core.name_at(Math.floor((at.x - rect.left) * px), Math.floor((at.y - rect.top) * px));
         return name && {...at, words: this.words_of_label(name)};
     }
@@ -388,7 +388,7 @@ export class ScanPage {
 
     set_image(change) {
         const v = this.values;
-        const image = {model_paper: v.model_paper, side: v.side, depth_mm: v.depth_mm, focus_mm: v.focus_mm, ...change};
+        const image = {model_paper: v.model_paper, width: v.width, height: v.height, depth_mm: v.depth_mm, focus_mm: v.focus_mm, ...change};
         image.depth_mm = clamp(image.depth_mm, 30, 300);
         image.focus_mm = clamp(image.focus_mm, 10, image.depth_mm);
         try {
@@ -426,7 +426,7 @@ export class ScanPage {
     auto_gain() { if (this.status === 0) this.set_console(this.core.adjusted_gain()); }
     flip() { this.set_console({flip: !this.console.flip}); }
     flip_sign() { return this.console.flip ? -1 : 1; }
-    mm_per_css_px() { return this.values.mm_per_px * this.values.side / this.picture.css_side; }
+    mm_per_css_px() { return this.values.mm_per_px / this.picture.css_per_px; }
 
     freeze(frozen) {
         this.frozen = frozen && this.values.kept > 0;

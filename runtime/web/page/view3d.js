@@ -193,7 +193,7 @@ export class View3d {
         const {gl} = this, {values} = this.scan;
         if (!this.meshes) this.make_meshes();
         this.orbit ??= this.core.scene_first();
-        const plane = [values.mm_per_px, values.origin_x, values.origin_y, values.side, this.scan.flip_sign()].join();
+        const plane = [values.mm_per_px, values.origin_x, values.origin_y, values.width, values.height, this.scan.flip_sign()].join();
         if (plane !== this.plane) {  // the picture lies on it in another way
             const n = kParts.indexOf('plane');
             this.drop(this.meshes[n]);

@@ -31,7 +31,8 @@ namespace {
 
 // Order of values(); page/core.js names them in the same order.
 enum Value {
-    kSide,
+    kWidth,
+    kHeight,
     kMmPerPx,
     kOriginX,
     kOriginY,
@@ -105,7 +106,8 @@ void fill_values() {
     const Renderer::Layout layout = engine.renderer().layout();
     auto& v = page.values;
     v = {};
-    v[kSide] = p.image().side_px;
+    v[kWidth] = p.image().width_px;
+    v[kHeight] = p.image().height_px;
     v[kMmPerPx] = layout.mm_per_px;
     v[kOriginX] = layout.origin_x_px;
     v[kOriginY] = layout.origin_y_px;
@@ -254,7 +256,7 @@ SONOCASE_EXPORT(warm_up) void warm_up(int frame) {
     if (frame == 0) page.warming = warm_up_player(512);
     if (frame < 0 || !page.warming) return;
     // What a scene is made with has to run more than once, too.
-    if (frame % 4 == 3 && !page.warming->choose_exercise(0, 512)) return;
+    if (frame % 4 == 3 && !page.warming->choose_exercise(0, 512, 512)) return;
     page.warming->hands().slide(0, frame % 2 ? 2 : -2);
     page.warming->frame(0.03 * frame, {});
 }
@@ -290,13 +292,15 @@ SONOCASE_EXPORT(metric_words) void metric_words() {
     page.text = metric_words_json();
 }
 
-SONOCASE_EXPORT(choose_exercise) int choose_exercise(int index, int side_px) {
-    return answer(page.player->choose_exercise(index, side_px));
+SONOCASE_EXPORT(choose_exercise) int choose_exercise(int index, int width_px, int height_px) {
+    return answer(page.player->choose_exercise(index, width_px, height_px));
 }
-SONOCASE_EXPORT(set_image) int set_image(int paper, int side_px, double depth_mm, double focus_mm) {
+SONOCASE_EXPORT(set_image)
+int set_image(int paper, int width_px, int height_px, double depth_mm, double focus_mm) {
     PageImage image;
     image.model = paper ? ImageModel::paper : ImageModel::physical;
-    image.side_px = side_px;
+    image.width_px = width_px;
+    image.height_px = height_px;
     image.depth_mm = depth_mm;
     image.focus_mm = focus_mm;
     return answer(page.player->set_image(image));
@@ -313,7 +317,7 @@ SONOCASE_EXPORT(set_tgc) void set_tgc(int slider, double db) {
 // Gain and depth gain from the last picture (runtime/engine/auto_gain.h): gain, then the sliders.
 SONOCASE_EXPORT(adjust_gain) const double* adjust_gain() {
     const PagePlayer& p = *page.player;
-    runtime::adjust_gain(p.pixels(), p.image().side_px, p.engine().renderer().layout(),
+    runtime::adjust_gain(p.pixels(), p.image().width_px, p.engine().renderer().layout(),
                          p.image().depth_mm, page.settings);
     page.numbers.assign(page.settings.tgc_db.begin(), page.settings.tgc_db.end());
     page.numbers.insert(page.numbers.begin(), page.settings.gain_db);
@@ -628,7 +632,7 @@ PageScene& scene() {
 PlanePicture picture_of(const PagePlayer& player) {
     const PageImage& image = player.image();
     return {player.engine().renderer().layout(), image.depth_mm,
-            player.engine().last().input.settings.flip_left_right, image.side_px, image.side_px};
+            player.engine().last().input.settings.flip_left_right, image.width_px, image.height_px};
 }
 
 }  // namespace

@@ -691,18 +691,22 @@ TEST_F(MarkerPose, NoPoseOfAPictureThatIsCalledGoodIsFarOff) {
     EXPECT_GT(run.good, run.pictures / 4);
 }
 
-// SONOCASE_FRAMES=N: the same over N pictures; what there is so far is said after every 500.
+// SONOCASE_FRAMES=N, SONOCASE_SEED=S: the same over N other pictures; what there is so far is said
+// after every 500.
 TEST_F(MarkerPose, DISABLED_LongRunOfPictures) {
     const char* text = std::getenv("SONOCASE_FRAMES");
-    const PictureRun run = run_of_pictures(camera_, bodies_, std::move(*detector_),
-                                           text ? std::atoi(text) : 100000, 5, 500);
+    const char* seed = std::getenv("SONOCASE_SEED");
+    const PictureRun run =
+        run_of_pictures(camera_, bodies_, std::move(*detector_), text ? std::atoi(text) : 100000,
+                        seed ? std::strtoull(seed, nullptr, 10) : 5, 500);
     run.print();
     EXPECT_EQ(run.far, 0);
 }
 
-// Times a tool is hidden for half a second and shown again, near where it was or elsewhere. Where
-// it then lies so far away, or so steep, that the whole picture shows fewer than two of its tags,
-// it is no fault that it is not back.
+// Times a tool is hidden for half a second and shown again, near where it was or elsewhere. In
+// light that changes from picture to picture nothing tells where it came. Where it then lies so far
+// away, or so steep, that the whole picture shows fewer than two of its tags, it is no fault that
+// it is not back.
 struct HiddenRun {
     int times = 0, readable = 0, in_time = 0, good_in_time = 0;  // in time: of the readable ones
     double lost_after_s = 0, back_after_s = 0;                   // the longest
@@ -713,6 +717,7 @@ HiddenRun hidden_and_shown(const CameraModel& camera,
                            int body,
                            double far_mm,
                            bool elsewhere,
+                           bool steady_light,
                            int times,
                            std::uint64_t seed) {
     const Rigid table = camera_from_table(650, 55 * kRadPerDeg);
@@ -745,8 +750,10 @@ HiddenRun hidden_and_shown(const CameraModel& camera,
             std::vector<PlacedBody> placed;
             if (i < kShown) placed.push_back(still_body(bodies[body], at));
             const double t = picture * kFrameS;
+            VideoOptions options;
+            if (!steady_light) options.brightness = picture % 2 ? 0.65 : 1;
             const std::vector<std::uint8_t> grey =
-                testing::through_jpeg(video.take(placed, t), 1280, 720, 75);
+                testing::through_jpeg(video.take(placed, t, options), 1280, 720, 75);
             const GreyPicture seen{grey.data(), 1280, 720, 1280};
             if (i == 0)
                 for (const SeenTag& tag : whole->find(seen).tags)
@@ -774,24 +781,34 @@ HiddenRun hidden_and_shown(const CameraModel& camera,
 }
 
 TEST_F(MarkerPose, WhatWasHiddenIsLostAndBackWithinATenthOfASecond) {
-    const HiddenRun run =
-        hidden_and_shown(camera_, bodies_, std::move(*detector_), 0, 900, false, 4, 9);
-    EXPECT_LE(run.lost_after_s, 0.1 + 1e-9);
-    EXPECT_LE(run.back_after_s, 0.1 + 1e-9);
+    HardCase back("a tool that comes back elsewhere, 400 to 900 mm away, back after",
+                  HardCase::at_most, 0.1 + 1e-9, "s");
+    for (const auto& [elsewhere, steady_light] :
+         {std::pair{false, true}, {true, true}, {true, false}}) {
+        auto detector = TagDetector::create();
+        const HiddenRun run = hidden_and_shown(camera_, bodies_, std::move(*detector), 0, 900,
+                                               elsewhere, steady_light, 4, 9);
+        EXPECT_LE(run.lost_after_s, 0.1 + 1e-9);
+        back.see(run.back_after_s);
+    }
 }
 
 // SONOCASE_TIMES=N: the same N times, of both tools.
 TEST_F(MarkerPose, DISABLED_LostAndFound) {
     const char* text = std::getenv("SONOCASE_TIMES");
-    for (const auto& [name, body, far_mm, elsewhere] :
-         {std::tuple{"probe, where it was", 0, 900.0, false},
-          std::tuple{"needle, where it was", 1, 900.0, false},
-          std::tuple{"probe, elsewhere to 0.7 m", 0, 700.0, true},
-          std::tuple{"probe, elsewhere to 0.9 m", 0, 900.0, true}}) {
+    for (const auto& [name, body, far_mm, elsewhere, steady_light] :
+         {std::tuple{"probe, where it was", 0, 900.0, false, true},
+          std::tuple{"needle, where it was", 1, 900.0, false, true},
+          std::tuple{"probe, elsewhere to 0.7 m", 0, 700.0, true, true},
+          std::tuple{"probe, elsewhere to 0.9 m", 0, 900.0, true, true},
+          std::tuple{"needle, elsewhere to 0.9 m", 1, 900.0, true, true},
+          std::tuple{"probe, elsewhere to 0.9 m, all of the picture changes", 0, 900.0, true,
+                     false}}) {
         auto detector = TagDetector::create();
         ASSERT_TRUE(detector);
-        const HiddenRun run = hidden_and_shown(camera_, bodies_, std::move(*detector), body, far_mm,
-                                               elsewhere, text ? std::atoi(text) : 40, 10);
+        const HiddenRun run =
+            hidden_and_shown(camera_, bodies_, std::move(*detector), body, far_mm, elsewhere,
+                             steady_light, text ? std::atoi(text) : 40, 10);
         std::printf(
             "%s: hidden for 0.5 s %d times: lost within %.3f s; of %d times with two tags or more, "
             "back within 0.1 s %d times, good by then %d times, at the latest after %.3f s\n",

@@ -48,9 +48,9 @@ class BreathingBall final : public Anatomy {
     double exit_distance(Point3 from, Vector3 direction, double reach) const override {
         return still_.exit_distance(from, direction, reach);
     }
-    Point3 at_rest(Point3 p, double time_s) const override {
-        return p - weight(p) * motion_.swing(time_s);
-    }
+    using Anatomy::at_rest;
+    Vector3 breath_mm(double time_s) const override { return motion_.swing(time_s); }
+    Point3 at_rest(Point3 p, Vector3 breath_mm) const override { return p - weight(p) * breath_mm; }
     Point3 moved(Point3 rest, double time_s) const override {
         const Vector3 s = motion_.swing(time_s);
         return rest + (weight(rest) / (1 - dot(motion_.slope_per_mm, s))) * s;

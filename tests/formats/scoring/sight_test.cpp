@@ -21,7 +21,7 @@ class Rib final : public Anatomy {
     double exit_distance(Point3 from, Vector3 d, double reach) const override {
         return d.z > 0 ? std::min(reach, -from.z / d.z) : reach;
     }
-    Point3 at_rest(Point3 p, double) const override { return p - Vector3{shift_mm_, 0, 0}; }
+    Point3 at_rest(Point3 p, Vector3) const override { return p - Vector3{shift_mm_, 0, 0}; }
     bool knows_tissue() const override { return true; }
     bool blocks_sound(int label) const override { return label == 2; }
 

@@ -52,9 +52,9 @@ struct Visit {
         auto opened = PagePlayer::open_in_parts(std::move(bytes), std::move(arrivals), "small");
         EXPECT_TRUE(opened) << opened.error().message();
         player = std::move(*opened);
-        EXPECT_TRUE(player->choose_exercise(0, 128));
+        EXPECT_TRUE(player->choose_exercise(0, 128, 128));
         whole = std::move(*PagePlayer::open({file.begin(), file.end()}, "whole"));
-        EXPECT_TRUE(whole->choose_exercise(0, 128));
+        EXPECT_TRUE(whole->choose_exercise(0, 128, 128));
     }
     void copy(ByteRange r, std::uint8_t* to) const {
         std::copy_n(file.begin() + static_cast<std::ptrdiff_t>(r.at), r.count, to + r.at);

@@ -99,15 +99,15 @@ const rate = await page.value(`new Promise((done) => {
         scan.touched();
         const seconds = (performance.now() - start) / 1000;
         if (seconds < 5) requestAnimationFrame(step);
-        else done({side: scan.values.side, pictures_per_s: (scan.frames - from) / seconds, frame_ms: scan.frame_ms});
+        else done({width: scan.values.width, height: scan.values.height, pictures_per_s: (scan.frames - from) / seconds, frame_ms: scan.frame_ms});
     };
     step();
 })`);
-console.log(`1280 x 720: ${rate.pictures_per_s.toFixed(1)} pictures per second of ${rate.side} x ${rate.side}`);
+console.log(`1280 x 720: ${rate.pictures_per_s.toFixed(1)} pictures per second of ${rate.width} x ${rate.height}`);
 for (const paper of [false, true]) {
     const ms = sorted(await page.value(`(() => {
         const {core} = sonoplay.app, ms = [];
-        core.set_image({...core.values(), model_paper: ${paper}, side: 512});
+        core.set_image({...core.values(), model_paper: ${paper}, width: 512, height: 512});
         for (let n = 0; n < 120; ++n) {
             core.calls.slide(0, n % 60 < 30 ? 1 : -1);
             const start = performance.now();

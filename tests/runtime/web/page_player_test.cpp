@@ -33,7 +33,7 @@ RawVector<std::uint8_t> bytes_of(const CaseBundle& bundle) {
 std::unique_ptr<PagePlayer> open_small() {
     auto player = PagePlayer::open(bytes_of(testing::small_case()), "small");
     EXPECT_TRUE(player);
-    EXPECT_TRUE((*player)->choose_exercise(0, 128));
+    EXPECT_TRUE((*player)->choose_exercise(0, 128, 128));
     return std::move(*player);
 }
 
@@ -88,13 +88,13 @@ TEST(PagePlayer, an_attempt_that_ended_is_looked_at_again_from_any_moment) {
     EXPECT_EQ(player->look_at_attempt(1e9), 0);
     player->frame(100, {});
     EXPECT_EQ(player->kept(), kFrames + 1) << "live again: the ring goes on where it was";
-    ASSERT_TRUE(player->choose_exercise(0, 128));
+    ASSERT_TRUE(player->choose_exercise(0, 128, 128));
     EXPECT_EQ(player->look_at_attempt(0), -1) << "another exercise";
 }
 
 TEST(PagePlayer, a_long_attempt_keeps_fewer_pictures_a_second) {
     const auto player = open_small();
-    ASSERT_TRUE(player->choose_exercise(0, 16));
+    ASSERT_TRUE(player->choose_exercise(0, 16, 16));
     ASSERT_TRUE(player->start_attempt("", "2026-01-31T12:00:00Z", 0));
     for (int n = 0; n < 3300; ++n) player->frame(0.1 * n, {});
     ASSERT_TRUE(player->finish_attempt());
@@ -203,7 +203,7 @@ answer = 1
     auto opened = PagePlayer::open(bytes_of(bundle), "small");
     ASSERT_TRUE(opened) << opened.error().message();
     PagePlayer& player = **opened;
-    ASSERT_TRUE(player.choose_exercise(0, 128));
+    ASSERT_TRUE(player.choose_exercise(0, 128, 128));
     ASSERT_TRUE(player.start_attempt("", "2026-01-31T12:00:00Z", 0));
     ASSERT_TRUE(player.hands().take_needle(player.exercise().probe, true));
     ASSERT_TRUE(player.hands().aim_needle_at({0, 0, 25}));
@@ -242,7 +242,7 @@ TEST(PagePlayer, an_attempt_is_drawn_from_its_seed_and_scored_there) {
     auto opened = PagePlayer::open(bytes_of(bundle), "small");
     ASSERT_TRUE(opened);
     PagePlayer& player = **opened;
-    ASSERT_TRUE(player.choose_exercise(0, 128));
+    ASSERT_TRUE(player.choose_exercise(0, 128, 128));
     EXPECT_NE(case_json(player).find("\"drawn\":true"), std::string::npos);
     const Exercise written = player.exercises()[0];
     const AttemptDraw expected = draw_attempt(written, CaseAnatomy(bundle), bundle.labels, 5);
@@ -262,7 +262,7 @@ TEST(PagePlayer, an_attempt_is_drawn_from_its_seed_and_scored_there) {
     ASSERT_TRUE(session);
     EXPECT_EQ(attempt_seed(session->header), 5u);
     // The next attempt without a seed is as written again.
-    ASSERT_TRUE(player.choose_exercise(0, 128));
+    ASSERT_TRUE(player.choose_exercise(0, 128, 128));
     EXPECT_EQ(player.exercise().targets[0].centre, written.targets[0].centre);
 }
 
@@ -294,13 +294,29 @@ TEST(PagePlayer, another_image_goes_on_with_the_session) {
     EXPECT_EQ(player->kept(), 1);
 }
 
+TEST(PagePlayer, draws_a_picture_as_wide_and_high_as_it_is_asked) {
+    const auto player = open_small();
+    const double square_mm_per_px = player->engine().renderer().layout().mm_per_px;
+    ASSERT_TRUE(player->choose_exercise(0, 256, 96));
+    player->frame(0, {});
+    EXPECT_EQ(player->pixels().size(), 256u * 96u);
+    const Renderer::Layout layout = player->engine().renderer().layout();
+    // The depth fits the height, and the face lies in the middle of the width.
+    EXPECT_LE(layout.origin_y_px + player->image().depth_mm / layout.mm_per_px, 96);
+    EXPECT_NEAR(layout.origin_x_px, 127.5, 0.5);
+    ASSERT_TRUE(player->choose_exercise(0, 256, 256));
+    EXPECT_NEAR(player->engine().renderer().layout().mm_per_px, square_mm_per_px / 2,
+                0.02 * square_mm_per_px);
+    EXPECT_TRUE(player->name_at(255, 0).empty());
+}
+
 TEST(PagePlayer, an_image_that_cannot_be_made_leaves_the_one_before) {
     const auto player = open_small();
     PageImage image = player->image();
-    image.side_px = 0;
+    image.height_px = 0;
     EXPECT_FALSE(player->set_image(image));
-    EXPECT_FALSE(player->choose_exercise(0, 0));
-    EXPECT_EQ(player->image().side_px, 128);
+    EXPECT_FALSE(player->choose_exercise(0, 0, 0));
+    EXPECT_EQ(player->image().height_px, 128);
     player->frame(0, {});
     EXPECT_NE(*std::max_element(player->pixels().begin(), player->pixels().end()), 0);
 }
@@ -381,7 +397,7 @@ TEST(PagePlayer, the_first_picture_is_the_windows) {
                                          image.height_px);
         engine->frame(0.1, console, window);
         ASSERT_EQ(image.width_px, image.height_px);
-        ASSERT_TRUE((*page)->choose_exercise(n, image.width_px));
+        ASSERT_TRUE((*page)->choose_exercise(n, image.width_px, image.height_px));
         (*page)->frame(0.1, {});
         EXPECT_EQ(copy((*page)->pixels()), window) << exercise.name;
         EXPECT_GT(std::count_if(window.begin(), window.end(), [](auto grey) { return grey > 20; }),
@@ -421,7 +437,7 @@ TEST(PagePlayer, an_expert_is_watched_and_hands_take_over_afterwards) {
     EXPECT_FALSE(player->watching());
     player->drop_attempt();
     ASSERT_TRUE(player->watch("along", 30));
-    ASSERT_TRUE(player->choose_exercise(0, 128));
+    ASSERT_TRUE(player->choose_exercise(0, 128, 128));
     EXPECT_FALSE(player->watching());
 }
 
@@ -510,7 +526,7 @@ TEST(PageStandings, are_those_of_the_windows_rule) {
 std::unique_ptr<PagePlayer> open_tube() {
     auto player = PagePlayer::open(bytes_of(testing::flowing_case()), "tube");
     EXPECT_TRUE(player);
-    EXPECT_TRUE((*player)->choose_exercise(0, 128));
+    EXPECT_TRUE((*player)->choose_exercise(0, 128, 128));
     return std::move(*player);
 }
 
@@ -582,10 +598,11 @@ TEST(PageDoppler, AnotherImageGoesOnInTheMode) {
     EXPECT_GT(coloured(*player), 50);
     PageImage image = player->image();
     image.depth_mm = 80;
-    image.side_px = 192;
+    image.width_px = 256;
+    image.height_px = 192;
     ASSERT_TRUE(player->set_image(image));
     player->frame(0.2, settings);
-    EXPECT_EQ(player->doppler().overlay().size(), 192u * 192u);
+    EXPECT_EQ(player->doppler().overlay().size(), 256u * 192u);
     EXPECT_GT(coloured(*player), 50);
 }
 
@@ -631,7 +648,7 @@ TEST(PageDoppler, WaitsForTheFlowOfACaseThatArrives) {
         PagePlayer::open_in_parts({file->begin(), file->end()}, std::move(arrivals), "tube");
     ASSERT_TRUE(opened) << opened.error().message();
     PagePlayer& player = **opened;
-    ASSERT_TRUE(player.choose_exercise(0, 128));
+    ASSERT_TRUE(player.choose_exercise(0, 128, 128));
     player.frame(0, {});
     const Status early = player.begin_doppler();
     ASSERT_FALSE(early);
@@ -645,7 +662,7 @@ TEST(PageDoppler, WaitsForTheFlowOfACaseThatArrives) {
 TEST(PageDoppler, ACaseWithoutFlowSaysSo) {
     auto opened = PagePlayer::open(bytes_of(testing::small_case()), "still");
     ASSERT_TRUE(opened);
-    ASSERT_TRUE((*opened)->choose_exercise(0, 128));
+    ASSERT_TRUE((*opened)->choose_exercise(0, 128, 128));
     ASSERT_TRUE((*opened)->begin_doppler());
     EXPECT_FALSE((*opened)->doppler().has_flow());
     ImageSettings settings;

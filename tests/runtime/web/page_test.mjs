@@ -52,7 +52,7 @@ await run_tests({
                 const {core, scan} = sonoplay.app;
                 scan.hide();
                 core.choose_exercise(0, 512);
-                core.set_image({model_paper: ${model === 'paper'}, side: 512, depth_mm: 0, focus_mm: 0});
+                core.set_image({model_paper: ${model === 'paper'}, width: 512, height: 512, depth_mm: 0, focus_mm: 0});
                 core.set_console({gain_db: 0, range_db: 60, tgc_db: new Array(8).fill(0), flip: false});
                 const out = [];
                 for (const frame of ${JSON.stringify(wanted.map(({time_s, probe, needle}) => ({time_s, probe, needle})))}) {
@@ -221,7 +221,7 @@ await run_tests({
         const before = await page.value(doppler), {x, y} = await page.value(`(() => {
             const {core, scan} = sonoplay.app, points = core.doppler_marks(), r = document.getElementById('picture').getBoundingClientRect(), v = scan.values;
             const middle = points.reduce((sum, p) => ({x: sum.x + p.x / points.length, z: sum.z + p.z / points.length}), {x: 0, z: 0});
-            const of = (mm, origin) => (mm / v.mm_per_px + origin) * r.width / v.side;
+            const of = (mm, origin) => (mm / v.mm_per_px + origin) * r.width / v.width;
             return {x: r.left + of(middle.x, v.origin_x), y: r.top + of(middle.z, v.origin_y)};
         })()`);
         await page.send('Input.dispatchMouseEvent', {type: 'mousePressed', x, y, button: 'left', buttons: 1, clickCount: 1});
@@ -348,6 +348,22 @@ await run_tests({
         expect_equal(faults.join('\n'), '', 'faults');
         await page.close();
     },
+    async the_picture_takes_the_width_and_height_that_the_page_has() {
+        for (const [width, height, ratio] of [[1920, 1080, 1], [1280, 720, 1], [844, 390, 2]]) {
+            const page = await browser.page(width, height);
+            Object.assign(page, {mobile: ratio > 1, ratio});
+            await scanning(page);
+            const said = await page.value(`(() => {
+                const {picture, values} = sonoplay.app.scan, box = document.getElementById('picture-box').getBoundingClientRect(), of = picture.canvas.getBoundingClientRect();
+                const middle = picture.mm_at(of.left + (values.origin_x + 0.5) * of.width / values.width, of.top + (values.origin_y + 0.5) * of.height / values.height, values);
+                return {wide: of.width / (box.width - 44), high: of.height / box.height, square: of.width / values.width / (of.height / values.height),
+                        px: values.width * values.height, drawn: sonoplay.frame().pixels.length, mm: Math.hypot(middle.x, middle.z)};
+            })()`);
+            expect(Math.max(said.wide, said.high) > 0.99 && Math.min(said.wide, said.high) > 0.9, `fills its room: ${JSON.stringify(said)}`);
+            expect(Math.abs(said.square - 1) < 1e-3 && said.px <= 1024 * 1024 && said.drawn === said.px && said.mm < 1, `square pixels, where they are drawn: ${JSON.stringify(said)}`);
+            await page.close();
+        }
+    },
     async a_phone_held_upright_shows_picture_needle_and_attempt_without_sideways_scrolling() {
         const page = await browser.page(390, 844);
         Object.assign(page, {mobile: true, ratio: 2});
@@ -473,9 +489,9 @@ await run_tests({
             const {scan} = sonoplay.app, canvas = document.getElementById('overlay'), on = canvas.getContext('2d');
             const ring = () => {
                 scan.draw(performance.now() / 1000);
-                const middle = scan.picture.left + scan.values.origin_x * scan.picture.css_side / scan.values.side, {data} = on.getImageData(0, 0, canvas.width, canvas.height);
+                const middle = scan.picture.left + scan.values.origin_x * scan.picture.css_per_px, {data} = on.getImageData(0, 0, canvas.width, canvas.height);
                 let left = 0, right = 0;
-                const from = middle - scan.picture.css_side / 2, to = middle + scan.picture.css_side / 2;
+                const from = middle - scan.picture.css_width / 2, to = middle + scan.picture.css_width / 2;
                 for (let n = 3; n < data.length; n += 4) if (data[n]) { const x = (n >> 2) % canvas.width; if (x > from && x < middle) ++left; else if (x < to && x > middle) ++right; }
                 return [left, right];
             };

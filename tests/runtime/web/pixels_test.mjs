@@ -41,7 +41,7 @@ async function same_pixels(name, model) {
     const wanted = drawn('frames', model, side);
     const core = await open(name);
     core.choose_exercise(0, side);
-    core.set_image({model_paper: model === 'paper', side, depth_mm: 0, focus_mm: 0});
+    core.set_image({model_paper: model === 'paper', width: side, height: side, depth_mm: 0, focus_mm: 0});
     let with_needle = 0;
     const digests = new Set(), times_ms = [];
     for (const [n, frame] of wanted.slice(0, 60).entries()) {
@@ -66,7 +66,7 @@ async function same_doppler(name) {
         const wanted = drawn('doppler', mode, side);
         const core = await open(name), made = new Set();
         core.choose_exercise(0, side);
-        core.set_image({model_paper: false, side, depth_mm: 0, focus_mm: 0});
+        core.set_image({model_paper: false, width: side, height: side, depth_mm: 0, focus_mm: 0});
         for (const [n, frame] of wanted.slice(0, 60).entries()) {
             core.put_tools(frame.time_s, frame.probe, null);
             if (n === 0) aim_at(core, frame, mode);
@@ -91,8 +91,8 @@ function aim_at(core, frame, mode) {
     core.calls.frame(frame.time_s);
     core.calls.aim_doppler();
     const aimed = core.doppler();
-    core.choose_exercise(0, core.values().side);
-    core.set_image({model_paper: false, side: core.values().side, depth_mm: 0, focus_mm: 0});
+    core.choose_exercise(0, core.values().width);
+    core.set_image({model_paper: false, width: core.values().width, height: core.values().height, depth_mm: 0, focus_mm: 0});
     core.set_doppler(aimed);
     core.put_tools(frame.time_s, frame.probe, null);
 }

@@ -58,14 +58,15 @@ HWY_INLINE void mean_clutter(const float* row, int lines, int reach, float* out)
 }
 
 // Adds tails, ringing and reverberation: echoes of their own, which pass through the point spread.
-template <class D, class V>
+// kSlides: a lung slides in the frame; without one nothing asks for it.
+template <bool kSlides, class D, class V>
 HWY_INLINE void add_clutter_noise(D d, const PhysicalRowTask& t, int i, V& re, V& im) {
     const auto half = hn::Set(d, 0.5f);
     const auto unit = hn::Set(d, t.inverse_gain / 32);
     auto power = hn::Set(d, t.near_field * t.near_field);
     if (t.tail != nullptr && t.sample >= t.tail_from[i / kBeamBlock]) {
         auto tail = smooth_light(d, t.tail + i);
-        if (t.slides != nullptr) {  // the grain behind a lung is its own
+        if constexpr (kSlides) {  // the grain behind a lung is its own
             const auto slides = hn::LoadU(d, t.slides + i);
             const auto level = hn::Mul(hn::Sqrt(hn::Mul(half, hn::Mul(tail, slides))), unit);
             for (int n = 0; n < 2; ++n) {
@@ -103,7 +104,7 @@ HWY_INLINE void add_electronic_noise(D d, const PhysicalRowTask& t, int i, V& re
 
 // The light of the aperture times the echoes of a look. kFirst: the first look, which keeps the
 // light for the others.
-template <bool kFirst>
+template <bool kFirst, bool kSlides>
 HWY_INLINE void light_look(const PhysicalRowTask& task, const std::int32_t* echoes) {
     const PhysicalRowTask t = task;  // a copy, which no store into a row can change
     const hn::CappedTag<float, kBeamBlock> d;
@@ -119,7 +120,7 @@ HWY_INLINE void light_look(const PhysicalRowTask& task, const std::int32_t* echo
         }
         const auto echo = hn::LoadU(di, echoes + i);
         auto re = hn::Mul(echo_real(d, echo), light), im = hn::Mul(echo_imaginary(d, echo), light);
-        if constexpr (kFirst) add_clutter_noise(d, t, i, re, im);
+        if constexpr (kFirst) add_clutter_noise<kSlides>(d, t, i, re, im);
         hn::StoreU(re, d, t.work_re + i);
         hn::StoreU(im, d, t.work_im + i);
     }
@@ -153,7 +154,12 @@ HWY_NOINLINE void spread_look(const PhysicalRowTask& task, float* out_re, float*
 
 template <bool kFirst>
 HWY_INLINE void filter_look(const PhysicalRowTask& t, int look) {
-    light_look<kFirst>(t, t.echoes + look * t.look_stride);
+    const std::int32_t* echoes = t.echoes + look * t.look_stride;
+    if (kFirst && t.slides != nullptr) {
+        light_look<kFirst, true>(t, echoes);
+    } else {
+        light_look<kFirst, false>(t, echoes);
+    }
     const int reach = t.point_spread ? t.reach : 0;
     float *mre = t.work_re, *mim = t.work_im;
     for (int j = 0; j < reach; ++j) {  // mirrored at the sector's edges

@@ -321,11 +321,12 @@ TEST_P(AnySeed, GivesTheSameMap) {
     const Registration first = fit(1, 96);
     const char* given = std::getenv("SONOCASE_SEEDS");
     const int seeds = given ? std::atoi(given) : 2;
-    const std::vector<int> all_starts = given ? std::vector{102, 130, 150, 192} : std::vector{102};
+    const std::vector<int> all_starts =
+        given ? std::vector{102, 111, 120, 130, 140, 150, 171, 192} : std::vector{102};
     for (const int starts : all_starts) {
         const double off = apart_mm(patient->labels, fit(1, starts), first);
-        // Other starts come to rest elsewhere in the same basin: 0.51 mm apart on the belly.
-        EXPECT_LE(off, 0.7) << starts << " starts";
+        // Other starts may come to rest elsewhere in the same basin: 0.41 mm apart on the shared pair.
+        EXPECT_LE(off, 0.5) << starts << " starts";
         if (given) std::printf("%s, %d starts: %.3f mm\n", which.c_str(), starts, off);
     }
     for (int seed = 2; seed <= seeds; ++seed) {

@@ -231,6 +231,50 @@ INSTANTIATE_TEST_SUITE_P(All,
                                     std::to_string(std::get<1>(one.param));
                          });
 
+// Ten mannequins of each build, read all round, the head as it is and turned: the figures of
+// docs/numerics.md. Run with --gtest_also_run_disabled_tests.
+TEST(HeadDirection, DISABLED_OfFiftyMannequinsReadAllRound) {
+    int alarms = 0, named = 0, untold = 0;
+    for (const Build build : kBuilds) {
+        for (std::uint64_t seed = 11; seed <= 20; ++seed) {
+            const BuiltMannequin m = built_mannequin(build, seed, {});
+            RegisterOptions options;
+            options.up = m.head;
+            const RegisterInput input{torso_patient().skin, m.sweep};
+            const auto right = align_surfaces(input, options);
+            options.up = -m.head;
+            const auto turned = align_surfaces(input, options);
+            ASSERT_TRUE(right && turned);
+            const bool alarm = warns(*right, "seems to point to the feet"),
+                       found = warns(*turned, "seems to point to the feet");
+            alarms += alarm;
+            named += found;
+            untold += !found && says_not_told(*turned, "head");
+            std::printf("%s %d: %s; turned: %s\n", build_name(build).c_str(),
+                        static_cast<int>(seed), note(*right, "head").c_str(),
+                        note(*turned, "head").c_str());
+        }
+    }
+    std::printf("of 50 right ones %d called wrong; of 50 turned ones %d named, %d not told\n",
+                alarms, named, untold);
+    EXPECT_EQ(alarms, 0);
+}
+
+// A mannequin 30 mm wider than the patient, read all round: its skins lie farther apart than a
+// missing counterpart costs, so that every pose beyond its ends scores better than the right one.
+// The share is that of the rigid pose, before any warp; of a pose off the body it is 0.
+TEST(HeadDirection, AWiderMannequinIsNotSlidOff) {
+    const BuiltMannequin m = built_mannequin(Build::wide, 15, {});
+    RegisterOptions options;
+    options.up = m.head;
+    const auto fitted = align_surfaces({torso_patient().skin, m.sweep}, options);
+    ASSERT_TRUE(fitted);
+    EXPECT_FALSE(warns(*fitted, "seems to point to the feet"));
+    HardCase reached("share of readings reached, mannequin 30 mm wider", HardCase::at_least, 0.3,
+                     "");
+    reached.see(fitted->fit.coverage);
+}
+
 // Bodies whose skin does tell, read all round: there the wrong sign is named outright.
 TEST(HeadDirection, WithItsSignTurnedIsNamedOutrightWhereTheSkinTells) {
     HardCase told("misfit the right way over that of the sign turned", HardCase::at_most, 0.943,
@@ -246,7 +290,8 @@ TEST(HeadDirection, WithItsSignTurnedIsNamedOutrightWhereTheSkinTells) {
             EXPECT_EQ(warns(*aligned, "seems to point to the feet"), sign < 0);
             const double here = measure(*aligned, "pose_score_mm"),
                          turned = measure(*aligned, "head_turned_score_mm");
-            told.see(sign > 0 ? here / turned : turned / here);
+            // Of the belly it tells by the fits before and after the warp together.
+            if (build == Build::pear) told.see(sign > 0 ? here / turned : turned / here);
         }
     }
 }

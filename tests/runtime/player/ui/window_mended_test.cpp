@@ -306,6 +306,20 @@ TEST_F(WindowMended, AnAbsentTrackerIsSaidOnThePicture) {
               0.6 * load_picture(folder_ / "mouse.png").mean(400, 150, 900, 250) + 8);
 }
 
+// Where nothing is asked of a needle, none is spoken of until one is taken.
+TEST_F(WindowMended, TheCardOfAScanSaysNothingOfNeedles) {
+    CaseBundle bundle = sonocase::testing::small_case();
+    std::string& toml = bundle.exercises.front().toml;
+    toml.replace(toml.find("\"vascular\""), 10, "\"scan\"");
+    ASSERT_TRUE(save_bundle(bundle, bundle_));
+    ASSERT_EQ(run("", "wait 6\nkey b\nwait 6\n" + shot("scan") + "key n\nwait 6\n" +
+                          shot("needle") + "quit\n")
+                  .status,
+              0);
+    EXPECT_FALSE(says("scan", "Skin punctures") || says("scan", "Tip in view"));
+    EXPECT_TRUE(says("needle", "Skin punctures") && says("needle", "Tip in view"));
+}
+
 // A second F5 leaves, the first only asks.
 TEST_F(WindowMended, ChangingTheExerciseDuringAnAttemptAsksFirst) {
     ASSERT_EQ(run("", "wait 6\nkey b\nwait 6\nkey f5\nwait 3\n" + shot("asked") +
@@ -317,7 +331,7 @@ TEST_F(WindowMended, ChangingTheExerciseDuringAnAttemptAsksFirst) {
     EXPECT_NE(asked.find(" hint\n"), std::string::npos);  // the attempt goes on
 }
 
-#ifdef SONOCASE_FAKE_VIDEO
+#ifdef SONOCASE_PRELOADED_VIDEO
 // The tracker panel lists cameras by their names and lenses by their files; a camera keeps the lens
 // that was chosen for it, and another one does not take it over.
 TEST_F(WindowMended, ACameraKeepsTheLensThatWasChosenForIt) {
@@ -336,7 +350,7 @@ TEST_F(WindowMended, ACameraKeepsTheLensThatWasChosenForIt) {
     constexpr int kTracker = 166, kLens = 244, kDesk = 298, kArm = 328, kDeskLens = 346;
     const auto chosen = [&](const std::string& clicks) {
         const CommandResult result =
-            in_display("LD_PRELOAD=" SONOCASE_FAKE_VIDEO " " +
+            in_display("LD_PRELOAD=" SONOCASE_PRELOADED_VIDEO " " +
                        command("--ui-scale 1", "wait 6\nkey f9\nwait 6\n" + clicks + "quit\n"));
         EXPECT_EQ(result.status, 0) << result.error;
         return settings()["tracker"].get<std::string>();

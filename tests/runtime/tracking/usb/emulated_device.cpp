@@ -316,9 +316,8 @@ ClientResult run_with_device(const DeviceSpec& spec,
         }
         ::dup2(pipe_ends[1], STDOUT_FILENO);
         ::close(pipe_ends[0]);
-        const char* before = std::getenv("SONOCASE_PRELOAD");  // a sanitizer's runtime goes first
-        const std::string preload =
-            (before && *before ? std::string(before) + ":" : "") + "libumockdev-preload.so.0";
+        const char* first = std::getenv("SONOCASE_PRELOAD_FIRST");  // tests/CMakeLists.txt
+        const std::string preload = std::string(first ? first : "") + "libumockdev-preload.so.0";
         ::setenv("LD_PRELOAD", preload.c_str(), 1);
         std::vector<char*> arguments;
         for (const std::string& word : command)
