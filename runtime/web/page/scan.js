@@ -267,6 +267,10 @@ export class ScanPage {
         put('value-view', attempt && v.has_needle ? (v.tip_in_view ? t('Yes') : t('No')) : '–');
         put('value-punctures', attempt ? String(v.insertions) : '–');
         put('value-depth', v.has_needle ? number(Math.max(v.needle_depth_mm, 0), 0, 'mm') : '–');
+        // Where nothing is asked of a needle, none is spoken of until one is taken.
+        const without_needle = this.exercise().kind === 'scan' && v.has_needle !== 1;
+        for (const id of ['value-tip', 'value-view', 'value-punctures', 'value-depth'])
+            $(id).hidden = $(id).previousElementSibling.hidden = without_needle;
         $('mode').disabled = attempt;
         $('task-words').hidden = attempt;  // read before; its room is for the events
         $('next-hint').disabled = this.exam();

@@ -457,6 +457,12 @@ await run_tests({
         const clock = (s) => s === null ? '–' : `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, '0')}`;
         expect_equal(lines.join('|'), items.map((one) => one.title + clock(one.time_s) + (one.critical ? 'critical' : '') + (one.ticked ? '✓ done'
             : `✗ ${{too_early: 'Too early', too_late: 'Too late', happened: 'It happened', wrong_answer: 'Answered wrongly', not_answered: 'Not answered'}[one.why] ?? 'Not done'}`)).join('|'), 'each line');
+        // A scan says nothing of needles until one is taken.
+        await page.open(`${its_url}?case=procedures&exercise=planes`);
+        await page.until(`${kFrames} > 0 && sonoplay.app.scan.complete`);
+        await page.until('document.getElementById("value-punctures").hidden');
+        await page.key('KeyN');
+        await page.until('!document.getElementById("value-punctures").hidden');
         expect_equal(page.errors.join(), '', 'errors on the console');
         await page.close();
         its_server.closeAllConnections?.();
