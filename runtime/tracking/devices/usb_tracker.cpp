@@ -106,6 +106,10 @@ void UsbTracker::run() {
             ++health_.connects;
         }
         stream(**pipe);
+        // A device that is gone is listed for a moment longer, and cannot be claimed then: the user
+        // would be told to close another program.
+        constexpr double kListedS = 0.1;
+        if (unplugged_) pause(kListedS);
     }
 }
 
