@@ -32,7 +32,7 @@ constexpr double kFrontScore = 1.2;
 // other are equal. Then the pose whose skin lay closer before it was deformed is the better one.
 constexpr double kEqualScore = 1.04;
 // Poses that reach fewer readings are not told apart by how close the rest of them lie.
-constexpr double kMostReadings = 0.5;
+constexpr double kJudgedCoverage = 0.5;
 // A pose that reaches less than this share of the readings that another reaches has slid off them,
 // where gaps cost no more than the missing counterparts and a hint is off.
 constexpr double kSlidOff = 0.5;
@@ -272,17 +272,18 @@ bool turned_front_to_back(const JudgedPose& a, const JudgedPose& b) {
 // other has its feet that are as good as equal, the one that fits best without a warp; of poses
 // turned front to back that tells nothing.
 void rank(std::vector<JudgedPose>& judged) {
-    double most = 0;
-    for (const JudgedPose& p : judged) most = std::max(most, p.coverage);
-    std::stable_sort(
-        judged.begin(), judged.end(), [most](const JudgedPose& a, const JudgedPose& b) {
-            const bool a_off = a.coverage < kSlidOff * most, b_off = b.coverage < kSlidOff * most;
-            return a_off == b_off ? a.score_mm < b.score_mm : b_off;
-        });
+    double best_coverage = 0;
+    for (const JudgedPose& p : judged) best_coverage = std::max(best_coverage, p.coverage);
+    std::stable_sort(judged.begin(), judged.end(),
+                     [best_coverage](const JudgedPose& a, const JudgedPose& b) {
+                         const bool a_off = a.coverage < kSlidOff * best_coverage,
+                                    b_off = b.coverage < kSlidOff * best_coverage;
+                         return a_off == b_off ? a.score_mm < b.score_mm : b_off;
+                     });
     std::size_t best = 0;
     for (std::size_t n = 1; n < judged.size(); ++n) {
-        const double least = std::max(kSlidOff * most, kMostReadings);
-        if (std::min(judged[0].coverage, judged[n].coverage) < least) break;
+        const double min_coverage = std::max(kSlidOff * best_coverage, kJudgedCoverage);
+        if (std::min(judged[0].coverage, judged[n].coverage) < min_coverage) break;
         if (judged[n].score_mm > kEqualScore * judged[0].score_mm) break;
         if (heads(judged[0], judged[n]) > -0.5) continue;
         if (judged[n].rigid.score_mm < judged[best].rigid.score_mm) best = n;

@@ -368,7 +368,7 @@ void PictureFollower::note_twice() {
             twice_.insert(std::lower_bound(twice_.begin(), twice_.end(), id), id);
 }
 
-// Of every so many pixels along both axes, so that there are some 320 across.
+// One pixel of so many along both axes is compared, so that there are some 320 across.
 int PictureFollower::sample_step(const GreyPicture& picture) {
     constexpr int kAcross = 320;
     return std::max(1, picture.width_px / kAcross);
@@ -397,7 +397,7 @@ std::vector<PictureRegion> PictureFollower::changed(const GreyPicture& picture) 
     constexpr int kTile = 20;
     // Lamps flicker by a twentieth and more, and cameras have noise: what differs by less than this
     // and an eighth of its brightness has not changed.
-    constexpr int kLeast = 12, kFlicker = 8;
+    constexpr int kMinDifference = 12, kFlicker = 8;
     constexpr int kFew = kTile * kTile / 40;  // samples; of a narrow tag there are sixteen
     const int step = sample_step(picture);
     const int columns = (picture.width_px + step - 1) / step;
@@ -412,7 +412,7 @@ std::vector<PictureRegion> PictureFollower::changed(const GreyPicture& picture) 
         for (int tile = 0; tile < across; ++tile) {
             int count = 0;
             for (int x = tile * kTile; x < std::min(columns, (tile + 1) * kTile); ++x)
-                count += std::abs(row[x * step] - kept[x]) > kLeast + kept[x] / kFlicker;
+                count += std::abs(row[x * step] - kept[x]) > kMinDifference + kept[x] / kFlicker;
             tiles[tile] += count;
         }
     }

@@ -305,13 +305,14 @@ Vector3 facing_shift(const Pair& pair, const Matrix3& rotation) {
 // off the readings come last: where bodies differ by more than a missing counterpart costs, they
 // have the lowest scores of all.
 std::vector<RigidCandidate> distinct(std::vector<RigidCandidate> all, int max_count) {
-    double most = 0;
-    for (const RigidCandidate& c : all) most = std::max(most, c.coverage);
-    std::stable_sort(
-        all.begin(), all.end(), [most](const RigidCandidate& a, const RigidCandidate& b) {
-            const bool a_off = a.coverage < kSlidOff * most, b_off = b.coverage < kSlidOff * most;
-            return a_off == b_off ? a.score_mm < b.score_mm : b_off;
-        });
+    double best_coverage = 0;
+    for (const RigidCandidate& c : all) best_coverage = std::max(best_coverage, c.coverage);
+    std::stable_sort(all.begin(), all.end(),
+                     [best_coverage](const RigidCandidate& a, const RigidCandidate& b) {
+                         const bool a_off = a.coverage < kSlidOff * best_coverage,
+                                    b_off = b.coverage < kSlidOff * best_coverage;
+                         return a_off == b_off ? a.score_mm < b.score_mm : b_off;
+                     });
     std::vector<RigidCandidate> chosen;
     for (const RigidCandidate& c : all) {
         if (static_cast<int>(chosen.size()) >= max_count) break;

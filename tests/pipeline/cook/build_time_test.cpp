@@ -53,12 +53,16 @@ double said_over_taken(const Built& b) {
                                          "\"\n[resample]\nvoxel_mm = " + std::to_string(b.voxel_mm),
                                      "case.toml", {}, &none);
     EXPECT_TRUE(recipe) << recipe.error().message();
-    return build_time(*recipe, size, b.voxel_mm, 1, 2).processor_s / b.took_s;
+    const BuildTime time = build_time(*recipe, size, b.voxel_mm, 1, 2);
+    EXPECT_LT(time.alone_s, time.processor_s) << b.name;
+    EXPECT_GT(time.alone_s, time.processor_s / 2) << b.name;
+    return time.processor_s / b.took_s;
 }
 
 // Builds that the law was fitted to. Their seconds are those of a machine that others used as well,
-// which alone makes a tenth of a difference.
-TEST(BuildTime, IsWithinAQuarterOfWhatBuildsTook) {
+// which alone makes a tenth of a difference. The farthest are 22.7 % (slender) and 20.5 % (22
+// labels) off, all others are within a fifth.
+TEST(BuildTime, IsWithin23PercentOfWhatBuildsTook) {
     const Built builds[] = {
         {"CT, 68 labels, 3 mm", 3.564, 23.75, 3, 14, .396, 0, 1.38, 0, Built::scanned, true, 11.7},
         {"2 mm", 3.564, 23.75, 2, 14, .396, 0, 1.38, 0, Built::scanned, true, 14.6},
@@ -89,7 +93,7 @@ TEST(BuildTime, IsWithinAQuarterOfWhatBuildsTook) {
     double squares = 0;
     for (const Built& b : builds) {
         const double ratio = said_over_taken(b);
-        EXPECT_NEAR(ratio, 1, 0.25) << b.name << ", " << b.took_s << " s";
+        EXPECT_NEAR(ratio, 1, 0.23) << b.name << ", " << b.took_s << " s";
         squares += (ratio - 1) * (ratio - 1);
     }
     EXPECT_LT(std::sqrt(squares / static_cast<double>(std::size(builds))), 0.1);
