@@ -69,7 +69,9 @@ std::vector<Rigid> opening_poses(const CaseBundle& bundle, const Exercise& exerc
     const auto add = [&](Point3 at, Vector3 beam, Vector3 lateral) {
         if (const auto pose = pose_on_skin(bundle, at, beam, lateral)) poses.push_back(*pose);
     };
-    const auto add_start = [&] { add(exercise.start_probe, exercise.start_beam, {1, 0, 0}); };
+    const auto add_start = [&] {
+        add(exercise.start_probe, exercise.start_beam, exercise.start_lateral);
+    };
     const auto needle = std::find_if(exercise.sweeps.begin(), exercise.sweeps.end(),
                                      [](const Sweep& s) { return s.name == "needle"; });
     const bool looks_around = needle == exercise.sweeps.end();
