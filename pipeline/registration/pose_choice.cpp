@@ -358,7 +358,15 @@ void check_head(const FitContext& s,
                 RigidOptions rigid,
                 const Progress& progress,
                 PoseChoice* choice) {
-    if (!given.hints.up) return;
+    if (!given.hints.up) {
+        // Less than half of the skin, mostly its front, has no head and feet of its own.
+        if (choice->best.skin_coverage < kWholeCoverage && given.landmarks.size() < 2)
+            choice->head =
+                "not told: no head direction was given, and so little of the skin was read that "
+                "it may as well lie the other way; --up X,Y,Z or two landmarks such as crotch and "
+                "navel would tell (--landmarks FILE.csv)";
+        return;
+    }
     Given turned = given;
     turned.hints.up = -*given.hints.up;
     rigid.starts = std::max(1, rigid.starts / kFewerStarts);
