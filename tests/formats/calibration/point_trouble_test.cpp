@@ -171,6 +171,7 @@ TEST(PointTrouble, EveryKindOfBadRowIsNamedAndLeftOut) {
     check("mirrored", [](Pose& p) {
         for (std::size_t k = 0; k < 3; ++k) p.tracker_from_tool.rotation.m[k] *= -1;
     });
+    // Whatever it is called.
     check("", [](Pose& p) { p.tracker_from_tool.translation.x = 1e308; });
     for (double f : {1e-3, 1e3, 1 / 25.4}) {
         check("units are mixed", [f](Pose& p) {
