@@ -16,12 +16,6 @@
 
 using namespace sonocase;
 
-// A probe whose face has its middle at `face` and looks along `beam`, in the `mannequin` frame.
-Rigid probe_pose(Point3 face, Vector3 beam) {
-    const Vector3 z = normalized(beam), x = any_perpendicular(z);
-    return {Matrix3::from_columns(x, cross(z, x), z), face - Point3{}};
-}
-
 int fail(const Error& error) {
     std::fprintf(stderr, "render_frame: %s\n", error.message().c_str());
     return 1;
@@ -50,7 +44,7 @@ int main(int argc, char** argv) {
 
     // From here on nothing allocates or fails: this is the part that runs once per frame.
     runtime::FrameInput input;
-    input.mannequin_from_probe = probe_pose(exercise->start_probe, exercise->start_beam);
+    input.mannequin_from_probe = start_pose(*exercise);
     std::vector<std::uint8_t> pixels(512 * 512);
     renderer->render(input, pixels);
 

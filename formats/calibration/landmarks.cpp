@@ -210,7 +210,27 @@ std::string name_of(std::span<const std::string> names, std::size_t i) {
     return i < names.size() ? names[i] : "number " + std::to_string(i + 1);
 }
 
-// Warns of exchanged landmarks and of a mirror image, which would fit far better.
+// Warns of a mirror image that would fit far better. Asked of all pairs: among six there are mostly
+// four that lie so flat that they fit as well in the mirror, and the others would count as wrong.
+bool warn_of_mirror(std::span<const Point3> from,
+                    std::span<const Point3> to,
+                    const std::vector<std::size_t>& chosen,
+                    double rms,
+                    bool with_scale,
+                    RigidFit& out) {
+    if (rms < 3 || chosen.size() < 4) return false;
+    std::vector<Point3> changed(to.begin(), to.end());
+    for (std::size_t i : chosen) changed[i].x = -changed[i].x;
+    const double now = rms_of(from, changed, chosen, with_scale);
+    if (now >= rms / 3) return false;
+    out.warnings.push_back(text(
+        "The landmarks fit as a mirror image (%.1f mm rms instead of %.1f); left and right are "
+        "exchanged, or one frame is left-handed.",
+        now, rms));
+    return true;
+}
+
+// Warns of exchanged landmarks, which would fit far better.
 void warn_of_exchanges(std::span<const Point3> from,
                        std::span<const Point3> to,
                        std::span<const std::string> names,
@@ -234,16 +254,6 @@ void warn_of_exchanges(std::span<const Point3> from,
                            text("%.1f mm rms instead of %.1f", now, rms) +
                            "); touch them again in the order of the list.";
             }
-        }
-    }
-    if (chosen.size() >= 4) {
-        for (std::size_t i : chosen) changed[i].x = -changed[i].x;
-        const double now = rms_of(from, changed, chosen, with_scale);
-        if (now < best) {
-            sentence = text(
-                "The landmarks fit as a mirror image (%.1f mm rms instead of %.1f); left and right "
-                "are exchanged, or one frame is left-handed.",
-                now, rms);
         }
     }
     if (!sentence.empty()) out.warnings.push_back(sentence);
@@ -366,7 +376,8 @@ RigidFit fit_rigid(std::span<const Point3> from,
 
     const bool with_scale = options.fit_scale;
     Solved best = solve(centred(from, to, chosen), with_scale);
-    if (options.reject_outliers)
+    const bool mirrored = warn_of_mirror(from, to, chosen, best.rms, with_scale, out);
+    if (options.reject_outliers && !mirrored)
         drop_wrong_pairs(from, to, names, with_scale, chosen, best, out.warnings);
 
     const Pairs pairs = centred(from, to, chosen);
@@ -389,7 +400,7 @@ RigidFit fit_rigid(std::span<const Point3> from,
 
     judge_landmarks(pairs, with_scale, out);
     if (!out.determined) return out;
-    warn_of_exchanges(from, to, names, chosen, best.rms, with_scale, out);
+    if (!mirrored) warn_of_exchanges(from, to, names, chosen, best.rms, with_scale, out);
     return out;
 }
 

@@ -355,6 +355,7 @@ Exercise read_exercise(const TomlTable& root) {
     root.texts("no_go", e.no_go);
     root.point("start_probe", e.start_probe);
     root.direction("start_beam", e.start_beam);
+    root.direction("start_lateral", e.start_lateral);
     root.number("start_spread_mm", e.start_spread_mm, 0, 500);
     for (const TomlTable& table : root.tables("sweeps")) read_sweep(table, e.sweeps);
     if (auto table = root.table("breathing")) {
@@ -396,6 +397,14 @@ Result<Exercise> parse_exercise(std::string_view text, const std::string& where)
     Exercise exercise = read_exercise(root);
     if (root.fault()) return *root.fault();
     return exercise;
+}
+
+Rigid start_pose(const Exercise& exercise) {
+    Vector3 z = normalized(exercise.start_beam);
+    if (norm(z) == 0) z = {0, 0, -1};
+    const Vector3 across = exercise.start_lateral - dot(exercise.start_lateral, z) * z;
+    const Vector3 x = norm(across) > 1e-6 ? normalized(across) : any_perpendicular(z);
+    return {Matrix3::from_columns(x, cross(z, x), z), exercise.start_probe - Point3{}};
 }
 
 Result<std::vector<ExerciseTexts>> parse_exercise_texts(std::string_view toml,

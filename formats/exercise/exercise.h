@@ -174,6 +174,7 @@ struct Exercise {
     std::vector<std::string> no_go;  // labels that must not be touched
     Point3 start_probe;              // where the mouse tracker begins
     Vector3 start_beam{0, 0, -1};
+    Vector3 start_lateral{1, 0, 0};  // probe x, made orthogonal to start_beam
     double start_spread_mm = 0;  // an attempt begins half to all of this away from start_probe
     std::vector<Sweep> sweeps;
     BreathingMotion breathing;
@@ -192,6 +193,9 @@ struct Exercise {
 
 // `where` names the file in errors.
 Result<Exercise> parse_exercise(std::string_view toml, const std::string& where);
+
+// mannequin_from_probe where the exercise begins, before the probe is set down on the skin.
+Rigid start_pose(const Exercise& exercise);
 
 // The lesions that show in the tissue: findings, then targets.
 std::vector<Target> shown_lesions(const Exercise& exercise);

@@ -128,16 +128,26 @@ double BreathingField::weight(Point3 p) const {
     const int x = static_cast<int>(fx), y = static_cast<int>(fy), z = static_cast<int>(fz);
     const double across[2] = {1 - (v.x - fx), v.x - fx}, along[2] = {1 - (v.y - fy), v.y - fy},
                  up[2] = {1 - (v.z - fz), v.z - fz};
-    const bool inside = x >= 0 && y >= 0 && z >= 0 && x + 1 < grid_.size.x &&
-                        y + 1 < grid_.size.y && z + 1 < grid_.size.z;  // nearly everywhere
+    const double share[4] = {across[0] * along[0], across[1] * along[0], across[0] * along[1],
+                             across[1] * along[1]};
     const std::ptrdiff_t row = grid_.size.x, plane = row * grid_.size.y;
     const std::ptrdiff_t corner = x + row * y + plane * z;
-    const std::ptrdiff_t step[8] = {0,     1,         row,         row + 1,
-                                    plane, plane + 1, plane + row, plane + row + 1};
+    if (x >= 0 && y >= 0 && z >= 0 && x + 1 < grid_.size.x && y + 1 < grid_.size.y &&
+        z + 1 < grid_.size.z) {  // nearly everywhere
+        const float* cell = cells_.data() + corner;
+        for (int c = 0; c < 2; ++c, cell += plane) {
+            sum += share[0] * up[c] * static_cast<double>(cell[0]);
+            sum += share[1] * up[c] * static_cast<double>(cell[1]);
+            sum += share[2] * up[c] * static_cast<double>(cell[row]);
+            sum += share[3] * up[c] * static_cast<double>(cell[row + 1]);
+        }
+        return sum;
+    }
     for (int c = 0; c < 8; ++c) {  // beyond the last cells lie zeros
-        if (!inside && !grid_.contains(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2))) continue;
-        sum += across[c & 1] * along[c >> 1 & 1] * up[c >> 2] *
-               static_cast<double>(cells_[static_cast<std::size_t>(corner + step[c])]);
+        if (!grid_.contains(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2))) continue;
+        const std::ptrdiff_t at = corner + (c & 1) + row * (c >> 1 & 1) + plane * (c >> 2);
+        sum +=
+            share[c & 3] * up[c >> 2] * static_cast<double>(cells_[static_cast<std::size_t>(at)]);
     }
     return sum;
 }

@@ -247,12 +247,9 @@ bool sees_in(const Anatomy& anatomy, Point3 skin, Vector3 inwards, Vector3 later
 }
 
 bool draw_start(Exercise& exercise, const Anatomy& anatomy, RandomStream& draws) {
-    Vector3 beam = normalized(exercise.start_beam);
-    if (norm(beam) == 0) beam = {0, 0, -1};
+    const Matrix3 start = start_pose(exercise).rotation;
+    const Vector3 beam = start.column(2), lateral = start.column(0);
     const Vector3 u = any_perpendicular(beam), v = cross(beam, u);
-    const Vector3 x{1, 0, 0};
-    const Vector3 across = x - dot(x, beam) * beam;
-    const Vector3 lateral = norm(across) > 1e-6 ? normalized(across) : u;
     double best_mm = -1;
     bool best_open = false;
     Point3 best;

@@ -56,8 +56,13 @@ std::string unknown_option(std::span<const std::string> words, std::span<const s
         if (word.size() < 3 || !word.starts_with("--")) continue;
         const std::string name = word.substr(0, word.find('='));
         if (std::find(known.begin(), known.end(), name) != known.end()) continue;
-        const std::string nearest = nearest_name(name, known);
-        return name + " is no option" + (nearest.empty() ? "" : "; did you mean " + nearest + "?");
+        // Dashes are common to all and make no two names alike.
+        std::vector<std::string> bare;
+        for (const std::string& option : known)
+            if (option.starts_with("--")) bare.push_back(option.substr(2));
+        const std::string nearest = nearest_name(std::string_view(name).substr(2), bare);
+        return name + " is no option" +
+               (nearest.empty() ? "" : "; did you mean --" + nearest + "?");
     }
     return {};
 }

@@ -10,8 +10,9 @@ Point3 Grid::point_from_voxel(Point3 voxel) const {
 }
 
 Point3 Grid::voxel_from_point(Point3 point) const {
-    const Vector3 v = transpose(direction) * (point - origin_mm);
-    return {v.x / spacing_mm.x, v.y / spacing_mm.y, v.z / spacing_mm.z};
+    const Vector3 v = point - origin_mm;  // its dot products are transpose(direction) * v
+    return {dot(direction.column(0), v) / spacing_mm.x, dot(direction.column(1), v) / spacing_mm.y,
+            dot(direction.column(2), v) / spacing_mm.z};
 }
 
 Box3 Grid::bounds() const {

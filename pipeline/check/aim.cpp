@@ -334,7 +334,8 @@ std::string aim_exercise(const AimTarget& target,
         "name = \"aim-" +
         target.name + "\"\ntitle = \"Find " + target.name +
         "\"\nkind = \"biopsy\"\nstart_probe = " + triple(first.skin) +
-        "\nstart_beam = " + direction(first.beam) + "\n";
+        "\nstart_beam = " + direction(first.beam) +
+        "\nstart_lateral = " + direction(first.lateral) + "\n";
     text += probe_text(options.probe, std::min(300.0, depth_mm), first.depth_mm);
     text += "\n[needle]\ngauge = " + number(options.needle.gauge) +
             "\nlength_mm = " + number(options.needle.length_mm) + "\n";

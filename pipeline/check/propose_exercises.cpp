@@ -246,7 +246,10 @@ std::string with_places(const Template& from,
         else if (table.empty() && key == "start_probe")
             out += "start_probe = " + triple(window.skin) + "\n";
         else if (table.empty() && key == "start_beam")
-            out += "start_beam = " + direction(window.beam) + "\n";
+            out += "start_beam = " + direction(window.beam) +
+                   "\nstart_lateral = " + direction(window.lateral) + "\n";
+        else if (table.empty() && key == "start_lateral")
+            ;  // stands beside the beam
         else if (table.empty() && key == "no_go")
             out += no_go_line(exercise, labels);
         else if (table == "[[targets]]" && key == "centre")

@@ -41,6 +41,20 @@ double nodes_between_slices(Vector3 spacing_mm, double voxels) {
     return voxels / 1e6 * std::max(2.0, std::round(h[2] / h[1]));
 }
 
+// Millions of nodes that one column between thick slices is measured on: 64 and the spline's rim
+// along an edge, the limit of distances, four slices, and the reach of the smoothing on each side.
+double nodes_of_column(const Grid& grid) {
+    constexpr double kColumn = 67, kSmoothing = 17;
+    int thick = 0;
+    for (const int a : {1, 2})
+        if (grid.spacing_mm[a] > grid.spacing_mm[thick]) thick = a;
+    const int x = (thick + 1) % 3, y = (thick + 2) % 3;
+    const double ratio = grid.spacing_mm[thick] / std::max(grid.spacing_mm[x], grid.spacing_mm[y]),
+                 edge = kColumn + 2 * (std::ceil(4 * ratio) + 1 + kSmoothing);
+    return std::min<double>(edge, grid.size[x]) * std::min<double>(edge, grid.size[y]) *
+           grid.size[thick] * std::max(2.0, std::round(ratio)) / 1e6;
+}
+
 // The map as it will be imported; of an analytic body one of a million voxels, whose boxes and
 // surfaces are as large.
 // Organ meshes are not turned into voxels twice.
@@ -142,6 +156,7 @@ CaseSize case_size(const Recipe& recipe) {
         const Grid grid = analytic_torso_grid({in.voxel_mm, in.voxel_mm, in.slice_mm}, in.body);
         voxels = static_cast<double>(grid.voxel_count());
         spacing_mm = grid.spacing_mm;
+        size.column_nodes = nodes_of_column(grid);
         // A torso's organs take the longest; a neck's map has much air.
         const double for_a_million = in.body.tubes ? 0.147 : in.body.neck_seed != 0 ? 0.053 : 0.4;
         size.sampling_s = for_a_million * voxels / 1e6;
@@ -176,7 +191,10 @@ CaseSize case_size(const Recipe& recipe) {
     if (map) {
         size.labels = static_cast<double>(map->labels.size());
         size.textures = textures_of(recipe, map->labels);
-        if (!recipe.inputs.analytic) spacing_mm = map->grid.spacing_mm;
+        if (!recipe.inputs.analytic) {
+            spacing_mm = map->grid.spacing_mm;
+            size.column_nodes = nodes_of_column(map->grid);
+        }
         const Counted count = counted(*map);
         size.surfaces = surfaces_of(count, map->grid.spacing_mm,
                                     node_spacing_mm(spacing_mm, size.interpolated_nodes, voxels));

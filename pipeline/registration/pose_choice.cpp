@@ -33,9 +33,6 @@ constexpr double kFrontScore = 1.2;
 constexpr double kEqualScore = 1.04;
 // Poses that reach fewer readings are not told apart by how close the rest of them lie.
 constexpr double kJudgedCoverage = 0.5;
-// A pose that reaches less than this share of the readings that another reaches has slid off them,
-// where gaps cost no more than the missing counterparts and a hint is off.
-constexpr double kSlidOff = 0.5;
 constexpr int kFewerStarts = 3;   // the head the other way is looked for with a third of the starts
 constexpr int kMoreSearches = 2;  // with twice the starts each, while only one start found the best
 
@@ -276,14 +273,13 @@ void rank(std::vector<JudgedPose>& judged) {
     for (const JudgedPose& p : judged) best_coverage = std::max(best_coverage, p.coverage);
     std::stable_sort(judged.begin(), judged.end(),
                      [best_coverage](const JudgedPose& a, const JudgedPose& b) {
-                         const bool a_off = a.coverage < kSlidOff * best_coverage,
-                                    b_off = b.coverage < kSlidOff * best_coverage;
+                         const bool a_off = slid_off(a.coverage, best_coverage),
+                                    b_off = slid_off(b.coverage, best_coverage);
                          return a_off == b_off ? a.score_mm < b.score_mm : b_off;
                      });
     std::size_t best = 0;
     for (std::size_t n = 1; n < judged.size(); ++n) {
-        const double min_coverage = std::max(kSlidOff * best_coverage, kJudgedCoverage);
-        if (std::min(judged[0].coverage, judged[n].coverage) < min_coverage) break;
+        if (std::min(judged[0].coverage, judged[n].coverage) < kJudgedCoverage) break;
         if (judged[n].score_mm > kEqualScore * judged[0].score_mm) break;
         if (heads(judged[0], judged[n]) > -0.5) continue;
         if (judged[n].rigid.score_mm < judged[best].rigid.score_mm) best = n;
@@ -358,7 +354,15 @@ void check_head(const FitContext& s,
                 RigidOptions rigid,
                 const Progress& progress,
                 PoseChoice* choice) {
-    if (!given.hints.up) return;
+    if (!given.hints.up) {
+        // Less than half of the skin, mostly its front, has no head and feet of its own.
+        if (choice->best.skin_coverage < kWholeCoverage && given.landmarks.size() < 2)
+            choice->head =
+                "not told: no head direction was given, and so little of the skin was read that "
+                "it may as well lie the other way; --up X,Y,Z or two landmarks such as crotch and "
+                "navel would tell (--landmarks FILE.csv)";
+        return;
+    }
     Given turned = given;
     turned.hints.up = -*given.hints.up;
     rigid.starts = std::max(1, rigid.starts / kFewerStarts);

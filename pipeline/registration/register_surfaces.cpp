@@ -204,8 +204,6 @@ StageReport warp_report(const FitContext& s,
     return report;
 }
 
-constexpr double kSlidOff = 0.5;  // share of the readings that were reached
-
 RegisterResult align(const FitContext& s,
                      const RegisterOptions& options,
                      const Stopwatch& watch,
@@ -221,7 +219,7 @@ RegisterResult align(const FitContext& s,
     take(refine_rigid_robust(s.fine, s.target, chosen, s.hints, 6, 15), &result);
     // Where bodies differ much the least gaps are those of a pose that has slid off the readings.
     take(chosen, &before);
-    if (result.fit.coverage < kSlidOff * before.fit.coverage) result = before;
+    if (slid_off(result.fit.coverage, before.fit.coverage)) result = before;
     result.rigid_fit = result.quadratic_fit = result.fit;
     result.runners_up = choice.runners_up;
     result.report = align_report(s, choice, result.fit, watch.seconds());

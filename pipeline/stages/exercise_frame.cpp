@@ -60,12 +60,16 @@ class Mapper {
     void map_beam(toml::table& table,
                   std::string_view position_key,
                   std::string_view beam_key,
+                  std::string_view lateral_key,
                   double look_mm) const {
         const auto position = triple_in(table, position_key);
         const Vector3 beam = normalized(triple_in(table, beam_key).value_or(Vector3{0, 0, -1}));
         if (!position) return;
         const Vector3 mapped = normalized(point(*position + look_mm * beam) - point(*position));
         set_triple(table, beam_key, mapped, 1e-6);
+        const Vector3 lateral =
+            normalized(triple_in(table, lateral_key).value_or(Vector3{1, 0, 0}));
+        set_triple(table, lateral_key, across(*position, lateral, mapped), 1e-6);
     }
 
     void map_key(toml::table& key) const {
@@ -79,9 +83,7 @@ class Mapper {
         double look_mm = 60;
         if (tip) look_mm = std::max(30.0, dot(*tip - *probe, beam));
         const Vector3 mapped_beam = normalized(point(*probe + look_mm * beam) - point(*probe));
-        Vector3 mapped_lateral = direction(*probe, lateral);
-        mapped_lateral =
-            normalized(mapped_lateral - dot(mapped_lateral, mapped_beam) * mapped_beam);
+        const Vector3 mapped_lateral = across(*probe, lateral, mapped_beam);
         if (tip) {
             const Vector3 normal = normalized(cross(beam, lateral));
             const bool in_plane = std::abs(dot(*tip - *probe, normal)) < 1 &&
@@ -105,6 +107,13 @@ class Mapper {
     }
 
   private:
+    // The turn of a direction at a place, made orthogonal to a beam that is mapped already.
+    Vector3 across(Vector3 at, Vector3 lateral, Vector3 mapped_beam) const {
+        const Vector3 mapped = direction(at, lateral),
+                      across = mapped - dot(mapped, mapped_beam) * mapped_beam;
+        return norm(across) > 1e-6 ? normalized(across) : any_perpendicular(mapped_beam);
+    }
+
     const Registration& registration_;
 };
 
@@ -205,7 +214,8 @@ Result<std::string> exercise_to_mannequin(const std::string& stripped_toml,
     toml::table& root = parsed.table();
     const Mapper mapper(registration);
     // Directions before the points that they start from.
-    if (root.contains("start_probe")) mapper.map_beam(root, "start_probe", "start_beam", 60);
+    if (root.contains("start_probe"))
+        mapper.map_beam(root, "start_probe", "start_beam", "start_lateral", 60);
     if (toml::table* breathing = root["breathing"].as_table()) {
         // The turn of the organs, taken at the first target, else where the probe starts.
         std::optional<Vector3> at = triple_in(root, "start_probe");

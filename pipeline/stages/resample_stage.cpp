@@ -223,6 +223,15 @@ double more_mb(const CaseSize& size, bool least) {
     // Candidates, for what is held; a node's label and margin; a cooked voxel and its records.
     constexpr double kCandidates = 0.25, kNode = 2, kCooked = 2.5;
     const double nodes = size.nodes();
+    // Large stacks of thick slices: the outlines of each voxel; 16-bit distances in blocks of 16
+    // nodes, for a million faces, and the pools that they were measured in; and for each of two
+    // threads a column, in which every node is measured, near a surface or not.
+    if (nodes > kLarge && size.interpolated_nodes > 0 && size.column_nodes > 0) {
+        constexpr double kOutlines = 5.5, kHeldInBlocks = 205, kColumns = 38, kPools = 1.75;
+        return kOutlines * size.label_voxels +
+               (size.held_mb > 0 ? kPools * size.held_mb : kHeldInBlocks * size.surfaces) +
+               std::max(kColumns * size.column_nodes, kNode * nodes + kCooked * size.cooked_voxels);
+    }
     if (nodes > kLarge)
         return std::min(1.0, size.surface_share()) * (505 + (least ? 8 : 12) * size.label_voxels) +
                3 * size.cooked_voxels;

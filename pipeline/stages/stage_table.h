@@ -164,6 +164,8 @@ struct CaseSize {
     double cooked_mm = 1;      // edge of a cooked voxel
     // Millions of nodes between thick slices that are interpolated; 0: none are.
     double interpolated_nodes = 0;
+    // Of them those of a column of 64 x 64, as long as the stack, with what is measured beside it.
+    double column_nodes = 0;
     // Millions of faces between nodes of different labels; of a torso where nobody has counted.
     double surfaces = 0;
     // Area of these faces, and what they enclose; of a torso where nobody has counted.

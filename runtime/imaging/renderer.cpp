@@ -112,6 +112,20 @@ int row_of_effect(const ImageModelInfo& info, std::string_view name) {
     return -1;
 }
 
+// True if frames of both inputs show the same tissue, pressed in the same way. Where a number is
+// none, it is false.
+bool same_tissue(const FrameInput& a, const FrameInput& b) {
+    const auto same_needle = [&] {
+        const NeedlePose &m = a.needle, &n = b.needle;
+        return m.tip == n.tip && m.direction == n.direction && m.bevel == n.bevel &&
+               m.tent_mm == n.tent_mm && m.drag_mm == n.drag_mm;
+    };
+    return a.mannequin_from_probe == b.mannequin_from_probe &&
+           a.settings.press_mm == b.settings.press_mm &&
+           a.change.venous_pressure_mmhg == b.change.venous_pressure_mmhg &&
+           a.has_needle == b.has_needle && (!a.has_needle || same_needle());
+}
+
 // The needle in the probe's frame; false if there is none to draw.
 bool needle_shown(const FrameInput& input, const NeedleModel& model, NeedleShape& needle) {
     const Vector3 d = input.needle.direction;
@@ -155,7 +169,9 @@ struct Renderer::Impl {
     bool presses = true;                       // false: it is left out for now
     PressReport press;                         // from the last frame
     Rigid shown_pose;
-    std::vector<Level> levels;  // finest first; one without a frame budget
+    FrameInput last;                // of the last frame
+    bool last_is_rendered = false;  // nothing was asked for since then
+    std::vector<Level> levels;      // finest first; one without a frame budget
     Governor governor;
     std::unique_ptr<Workers> workers;
     std::unique_ptr<ImageFormation> formation;  // ends before the workers that it uses
@@ -244,6 +260,8 @@ FrameStatus Renderer::render(const FrameInput& input, std::span<std::uint8_t> pi
     const FrameStatus status =
         m.formation->render_fast(m.governor.level(), request, pixels, m.costs);
     if (pressed != nullptr) m.costs[m.deformation].ms += press_ms;
+    m.last = input;
+    m.last_is_rendered = m.governor.level() == 0;
     m.governor.frame_took(press_ms + timer.lap_ms());
     return status;
 }
@@ -251,11 +269,22 @@ FrameStatus Renderer::render(const FrameInput& input, std::span<std::uint8_t> pi
 void Renderer::press_probe(const FrameInput& input) {
     Impl& m = *impl_;
     if (!valid_pose(input.mannequin_from_probe)) return;
+    m.last_is_rendered = false;
     m.shown_pose = input.mannequin_from_probe;
     if (!m.probe || !m.presses) return;
     m.probe->set_venous_pressure(input.change.venous_pressure_mmhg);
     m.shown_pose = m.probe->at(input.mannequin_from_probe, input.settings.press_mm);
     m.press = m.probe->report();
+}
+
+std::optional<RenderedFrame> Renderer::rendered(const FrameInput& input) const {
+    const Impl& m = *impl_;
+    const bool pools = m.last.change.pool_count > 0 || input.change.pool_count > 0;
+    if (!m.last_is_rendered || pools || !same_tissue(m.last, input)) return std::nullopt;
+    RenderedFrame rendered;
+    if (m.presses) rendered.probe = m.probe.get();
+    m.formation->describe(rendered);
+    return rendered;
 }
 
 const PressReport& Renderer::press() const {
@@ -268,6 +297,7 @@ const Rigid& Renderer::shown_pose() const {
 
 double Renderer::press_mm_for(const Rigid& pose, double force_n, double start_mm) {
     if (!impl_->probe || !(force_n > 0) || !valid_pose(pose)) return 0;
+    impl_->last_is_rendered = false;
     return impl_->probe->press_mm_for(pose, force_n, start_mm);
 }
 
@@ -284,6 +314,7 @@ bool Renderer::closed(Point3 rest) const {
 }
 
 void Renderer::leave_out(int effect) {
+    impl_->last_is_rendered = false;
     impl_->presses = effect != impl_->deformation;
     impl_->formation->leave_out(effect);
 }

@@ -11,6 +11,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -22,6 +23,8 @@
 #include "runtime/imaging/core/render_options.h"
 
 namespace sonocase::runtime {
+
+struct RenderedFrame;  // runtime/imaging/core/image_formation.h
 
 class Renderer {
   public:
@@ -66,6 +69,10 @@ class Renderer {
 
     // Pose of the face in the last frame: the input's pose, pressed, and held back by bone.
     const Rigid& shown_pose() const;
+
+    // What it found for the last frame, for the truth of that frame; nothing unless that frame was
+    // of this input at full accuracy. Pools are left to the truth, which places them itself.
+    std::optional<RenderedFrame> rendered(const FrameInput& input) const;
 
     // What a frame budget gives up at present; level 0 is full accuracy.
     struct Accuracy {

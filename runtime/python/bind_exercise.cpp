@@ -228,7 +228,7 @@ void bind_exercise(py::module_& module) {
         .def_property_readonly(
             "start_pose",
             [](const CaseExercise& e) {
-                return array_of(pose_along(e.start_probe, e.start_beam, {1, 0, 0}));
+                return array_of(start_pose(e));
             },
             "mannequin_from_probe where the exercise begins, before the probe is set down on the "
             "skin; shape (4, 4), mm.")

@@ -112,15 +112,19 @@ void FrameRenderer::render_with(Worker& worker, FrameTask& task) {
     record.input = task.input;
     task.status = worker.engine.frame_again(record, task.pixels);
     task.press = worker.engine.renderer().press();
-    if (task.wants_truth) task.truth = worker.truth->render(task.input, task.planes);
+    if (task.wants_truth) describe_with(worker, task);
 }
 
 void FrameRenderer::render(FrameTask& task) {
     render_with(*workers_.front(), task);
 }
 
+void FrameRenderer::describe_with(Worker& worker, FrameTask& task) {
+    task.truth = worker.truth->render(task.input, task.planes, &worker.engine.renderer());
+}
+
 void FrameRenderer::describe(FrameTask& task) {
-    task.truth = workers_.front()->truth->render(task.input, task.planes);
+    describe_with(*workers_.front(), task);
 }
 
 Result<bool> FrameRenderer::render_all(std::span<FrameTask> tasks,

@@ -111,6 +111,7 @@ class FrameRenderer {
     Status add_worker();
     Status add_truth(Worker& worker);
     static void render_with(Worker& worker, FrameTask& task);
+    static void describe_with(Worker& worker, FrameTask& task);
 
     std::shared_ptr<OpenedCase> opened_;
     Exercise exercise_;

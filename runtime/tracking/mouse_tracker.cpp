@@ -22,9 +22,9 @@ constexpr double kNeedleHover = 60;   // mm that a needle can be held back from 
 MouseTracker::MouseTracker(const Skin& skin, const Exercise& exercise)
     : skin_(skin),
       start_probe_(exercise.start_probe),
-      start_beam_(normalized(exercise.start_beam)),
+      start_beam_(start_pose(exercise).rotation.column(2)),
+      start_lateral_(start_pose(exercise).rotation.column(0)),
       needle_length_mm_(exercise.needle.length_mm) {
-    if (norm(start_beam_) == 0) start_beam_ = {0, 0, -1};
     reset();
 }
 
@@ -35,7 +35,7 @@ void MouseTracker::reset() {
     contact_ = start_probe_;
     changed_ = true;
     normal_ = -start_beam_;
-    lateral_ = frame_along(start_probe_, start_beam_, {1, 0, 0}).rotation.column(0);
+    lateral_ = start_lateral_;
     // A start outside the body or deep inside it is moved onto the skin: the search along the beam
     // goes farther until it meets the skin.
     if (put_probe(start_probe_, start_beam_)) return;

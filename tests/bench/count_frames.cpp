@@ -118,17 +118,24 @@ class Frames {
         all();
         counted(name, poses_.size(), all);
     }
-    // What labels, needle, shadows and depths of a frame add to it.
-    void truth(const std::string& name) {
+    // What labels, needle, shadows and depths of a frame add to it; planes: all, or the first two.
+    void truth(const std::string& name, double press_mm = 0, bool all_planes = true) {
         const RenderOptions o = options(ImageModel::physical, "auto", "modern");
+        Renderer renderer = made(exercise_, o);
         auto truth = TruthRenderer::create(bundle_, exercise_, o);
         must(static_cast<bool>(truth), "no truth");
         std::vector<std::uint8_t> labels(pixels_.size()), needle = labels, shadowed = labels;
         std::vector<float> depth(pixels_.size());
+        TruthPlanes planes{labels, needle, {}, {}};
+        if (all_planes) planes = {labels, needle, shadowed, depth};
         const auto all = [&] {
             for (FrameInput input : poses_) {
                 input.time_s = 1.3;  // in the middle of a breath
-                truth->render(input, {labels, needle, shadowed, depth});
+                input.settings.press_mm = press_mm;
+                CALLGRIND_TOGGLE_COLLECT;
+                renderer.render(input, pixels_);
+                CALLGRIND_TOGGLE_COLLECT;
+                truth->render(input, planes, &renderer);
             }
         };
         all();
@@ -235,6 +242,8 @@ void count_all(const std::string& path) {
     f.frames("physical/modern-linear/procedure", acts(linear), flat);
     f.frames("physical/modern-linear/pool_2_ml", acts(linear), flat, 0, 2);
     f.truth("truth");
+    f.truth("truth/pressed_8_mm", 8);
+    f.truth("truth/labels_and_needle", 0, false);
     f.colour("physical/colour");
     f.start("first_frame/paper", f.options(paper, "auto"));
     f.start("first_frame/physical", f.options(physical, "auto"));

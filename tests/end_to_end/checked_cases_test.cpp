@@ -205,11 +205,15 @@ std::string all_of(const CheckResult& result) {
 }
 
 TEST(CheckedCases, HaveNoFaultsAndTenPlantedOnesAreNamed) {
+    testing::HardCase planted_ones("of ten planted faults in each case, named",
+                                   testing::HardCase::at_least, 10, "");
+    testing::HardCase none("faults of the cases as they are", testing::HardCase::at_most, 0, "");
     for (const Body& body : kBodies) {
         const CaseBundle* bundle = cooked(body);
         if (bundle == nullptr) continue;
         const CheckResult plain = check_case(*bundle);
         EXPECT_TRUE(plain.faults.empty()) << body.scenario << "\n" << all_of(plain);
+        none.see(static_cast<double>(plain.faults.size()));
         int found = 0;
         for (const Planted& planted : ten_faults()) {
             CaseBundle spoilt = *bundle;
@@ -223,6 +227,7 @@ TEST(CheckedCases, HaveNoFaultsAndTenPlantedOnesAreNamed) {
                                   << all_of(result);
             found += named_it;
         }
+        planted_ones.see(found);
         std::printf("%s: %zu faults, %d of 10 planted ones named\n", body.scenario,
                     plain.faults.size(), found);
     }

@@ -32,9 +32,9 @@ constexpr const char* kDraft = "8411c16c17fb1c204b7fdf134d446d96";
 constexpr const char* kBalanced = "15b230d3f0c38155012ebfd2821f587a";
 constexpr const char* kSlender = "d443a83528ac8b482ffe522017900a1f";
 constexpr const char* kReal = "d3aa873c165ac65b46ec6c66abfbd372";
-constexpr const char* kDraftPhysical = "2b2c53014163238afd94862e3bbcd6d3";
+constexpr const char* kDraftPhysical = "71811d3caf4d7d9b1bdd6f6e0705ae83";
 constexpr const char* kDraftPaper = "1aaccd9bf66881ec2231c9c0ceb219e6";
-constexpr const char* kRealPhysical = "67544c58b76eddf02da76cf03e9312dd";
+constexpr const char* kRealPhysical = "cf7502df941c3f881fd8992120dc71a1";
 constexpr const char* kRealPaper = "171f0dd55595047b8aebbc8803a1aecb";
 
 class SameBytes : public ::testing::Test {

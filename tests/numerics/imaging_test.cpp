@@ -17,6 +17,19 @@ using testing::HardCase;
 
 using namespace sonocase::runtime;
 
+TEST(NeedleConstraintNumerics, WeightOfAnyDepthStaysInRange) {
+    NeedleConstraintOptions o;
+    HardCase beyond("weight of depths from -1e300 to 1e300, beyond its range", HardCase::at_most, 0,
+                    "");
+    for (double steepness : {1e-3, 1.0, 10.0}) {
+        o.steepness_per_mm = steepness;
+        for (double depth : {-1e300, -5.0, 0.0, 1e-9, 10.0, 120.0, 1e6, 1e300}) {
+            const double w = needle_constraint_weight(depth, o);
+            beyond.see(std::max({0.0, -w, w - o.max_weight}));
+        }
+    }
+}
+
 RC_GTEST_PROP(NeedleConstraintNumerics, WeightIsThatOfLongDoubleRisesAndStaysInRange, ()) {
     testing::Random random = random_case();
     NeedleConstraintOptions o;

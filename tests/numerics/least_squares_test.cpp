@@ -245,17 +245,18 @@ TEST(LeastSquaresNumerics, OpenDirectionsAreFoundAndTheAnswerIsTheShortest) {
 }
 
 TEST(LeastSquaresNumerics, NothingZeroAndOneRow) {
+    HardCase off("answers of a zero row and of one row, off", HardCase::at_most, 0, "");
     EXPECT_EQ(LeastSquares(3).solve().rank, 0);
     LeastSquares zero(2);
     const double none[2] = {0, 0};
     zero.add(none, 5);
     EXPECT_EQ(zero.solve().rank, 0);
     EXPECT_EQ(zero.solve().residual_sum, 25);
-    EXPECT_EQ(zero.solve().x[0], 0);
+    for (const double x : zero.solve().x) off.see(std::abs(x));
     LeastSquares one(1);
     const double two = 2;
     one.add(&two, 6);
-    EXPECT_EQ(one.solve().x[0], 3);
+    off.see(std::abs(one.solve().x[0] - 3));
     EXPECT_EQ(one.solve().condition(), 1);
 }
 

@@ -105,6 +105,13 @@ TEST(LevelSetNumerics, StepAboveTheLimitIsRefused) {
     pipeline::LevelSetOptions options;
     options.time_step = 1.01 * limit;
     EXPECT_FALSE(pipeline::level_set_smoothing(v, options));
+    double taken = 0.5, refused = 2;
+    while (refused - taken > 1e-4) {
+        options.time_step = 0.5 * (taken + refused) * limit;
+        (pipeline::level_set_smoothing(v, options) ? taken : refused) = options.time_step / limit;
+    }
+    HardCase largest("largest step taken, over the limit", HardCase::at_most, 1.0001, "");
+    largest.see(taken);
     options.time_step = 0.99 * limit;
     EXPECT_TRUE(pipeline::level_set_smoothing(v, options));
 }

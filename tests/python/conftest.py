@@ -12,6 +12,22 @@ import sonocase
 BIN = pathlib.Path(os.environ["SONOCASE_BIN"])
 
 
+@pytest.fixture
+def hard_case(request):
+    """hard_case(what, value, most): a figure of docs/numerics.md, as tests/support/hard_case.h has them. The value is
+    held to the limit and to the document; scripts/hard-cases writes it."""
+    def see(what, value, most=0):
+        assert value <= most, what
+        tail = f" (at most {most:g})"
+        if path := os.environ.get("SONOCASE_HARD_CASES"):
+            with open(path, "a") as file:
+                file.write(f"{request.node.originalname}\t{what}\t{value:.2g}\t{tail}\n")
+            return
+        page = (pathlib.Path(__file__).parents[2] / "docs" / "numerics.md").read_text()
+        assert f"{what}: {value:.2g}{tail}" in page, "scripts/hard-cases writes it anew"
+    return see
+
+
 @pytest.fixture(scope="session")
 def small(tmp_path_factory):
     folder = tmp_path_factory.mktemp("case")

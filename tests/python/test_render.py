@@ -24,14 +24,14 @@ def test_nothing_of_the_pipeline_or_the_window_is_linked():
 
 
 @pytest.mark.parametrize("model", ["physical", "paper"])
-def test_pixels_are_those_of_the_player(small, sonoplay, tmp_path, model):
+def test_pixels_are_those_of_the_player(small, sonoplay, tmp_path, model, hard_case):
     path, _ = small
     # How a needle dents tissue depends on its past, which the player keeps: the truth says it.
     sonoplay(path, "--headless", "--frames", 12, "--size", "200x160", "--model", model,
              "--out", tmp_path / "out", "--truth", tmp_path / "truth")
     case = sonocase.Case.open(path)
     renderer = sonocase.Renderer(case, model=model, size=(200, 160))
-    dented = 0
+    dented = other = 0
     for line in (tmp_path / "truth" / "truth.jsonl").read_text().splitlines():
         truth = json.loads(line)
         needle = truth["mannequin_from_needle"]
@@ -39,9 +39,10 @@ def test_pixels_are_those_of_the_player(small, sonoplay, tmp_path, model):
         dented += dent is not None and any(dent)
         picture = renderer.render(truth["mannequin_from_probe"], needle, truth["time_s"],
                                   frame=truth["frame"], dent=dent)
-        np.testing.assert_array_equal(
-            picture, read_png(tmp_path / "out" / f"frame_{truth['frame']:05d}.png"))
+        played = read_png(tmp_path / "out" / f"frame_{truth['frame']:05d}.png")
+        other += np.count_nonzero(picture != played)
     assert dented > 0
+    hard_case("pixels of twelve frames other than the player's", other)
 
 
 def test_a_needles_dent_is_drawn_and_said(case, pose):
@@ -169,12 +170,14 @@ def test_a_bad_pose_is_an_exception_of_one_line(case, bad, error, words):
     assert words in str(raised.value) and "\n" not in str(raised.value)
 
 
-def test_the_bad_pose_of_a_batch_is_named(case, pose):
+def test_the_bad_pose_of_a_batch_is_named(case, pose, hard_case):
     renderer = sonocase.Renderer(case, size=(32, 32))
     poses = np.stack([pose] * 4)
     poses[2, 0, 0] = 7
+    out = np.zeros((4, 32, 32), np.uint8)
     with pytest.raises(ValueError, match=r"poses\[2\]"):
-        renderer.render_batch(poses)
+        renderer.render_batch(poses, out=out)
+    hard_case("pixels drawn of a batch with a pose that is none", np.count_nonzero(out))
     assert renderer.render_batch(np.empty((0, 4, 4))).shape == (0, 32, 32)
     with pytest.raises(ValueError, match="one number per pose"):
         renderer.render_batch(np.stack([pose] * 3), times_s=[0, 1])
@@ -253,7 +256,7 @@ def test_one_renderer_is_for_one_thread_at_a_time(case, pose):
     renderer.render(pose)  # and works again
 
 
-def test_ctrl_c_ends_a_batch(small):
+def test_ctrl_c_ends_a_batch(small, hard_case):
     """In a process of its own, whose interrupt comes from another thread while a batch runs."""
     program = f"""
 import _thread, signal, sys, threading
@@ -272,7 +275,8 @@ except KeyboardInterrupt:
     renderer.render(pose)
     sys.exit(42)
 """
-    assert subprocess.run([sys.executable, "-c", program]).returncode == 42
+    ended = [subprocess.run([sys.executable, "-c", program]).returncode for _ in range(3)]
+    hard_case("of three batches, going on after Ctrl-C", sum(code != 42 for code in ended))
 
 
 def test_pressing_gives_force_and_moves_what_truth_says(case, pose):

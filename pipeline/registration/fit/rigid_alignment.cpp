@@ -22,7 +22,6 @@ namespace {
 // bodies after a rigid alignment: overlap as such is neither rewarded nor penalised.
 constexpr double kNoCounterpartMm = 12;
 constexpr double kScoreScaleMm = 10;
-constexpr double kSlidOff = 0.5;  // share of the readings that another pose reaches
 // Poses nearer to each other are one.
 constexpr double kSamePoseRad = 20 * kPi / 180, kSamePoseMm = 40;
 
@@ -309,8 +308,8 @@ std::vector<RigidCandidate> distinct(std::vector<RigidCandidate> all, int max_co
     for (const RigidCandidate& c : all) best_coverage = std::max(best_coverage, c.coverage);
     std::stable_sort(all.begin(), all.end(),
                      [best_coverage](const RigidCandidate& a, const RigidCandidate& b) {
-                         const bool a_off = a.coverage < kSlidOff * best_coverage,
-                                    b_off = b.coverage < kSlidOff * best_coverage;
+                         const bool a_off = slid_off(a.coverage, best_coverage),
+                                    b_off = slid_off(b.coverage, best_coverage);
                          return a_off == b_off ? a.score_mm < b.score_mm : b_off;
                      });
     std::vector<RigidCandidate> chosen;

@@ -61,6 +61,12 @@ struct RigidCandidate {
     int found = 0;           // starts that ended near it; 0: it comes from elsewhere
 };
 
+// Whether a pose that reaches this share of the readings has slid off them: another reaches more
+// than twice as many. Its gaps are the least where the missing counterparts cost no more than they.
+inline bool slid_off(double coverage, double best_coverage) {
+    return coverage < 0.5 * best_coverage;
+}
+
 // Distinct candidates (more than 20 degrees or 40 mm apart), best score first; never empty.
 std::vector<RigidCandidate> align_rigid_candidates(const SkinModel& skin,
                                                    const TargetSurface& target,

@@ -28,7 +28,9 @@ namespace sonocase::runtime {
 
 namespace press {
 class PressField;
-}
+class PressView;
+class ProbePress;
+}  // namespace press
 
 // What does the work of a renderer. Workers and jobs outlive whatever they are given to.
 struct RenderContext {
@@ -57,6 +59,16 @@ struct FrameRequest {
     std::span<const float> row_gain_db;  // # samples of the level: console gain and TGC sliders
 };
 
+// What a renderer found on its way to its last frame, at full accuracy: whoever describes that
+// frame need not find it again. It holds until the renderer does anything else.
+struct RenderedFrame {
+    const press::ProbePress* probe = nullptr;      // null: the effect is off
+    const press::PressView* press_view = nullptr;  // null: nothing moves, or the model keeps none
+    // Effect contact: # scanlines, as pressed; negative: air. Empty: the effect is off.
+    std::span<const float> gaps_mm;
+    int touching = 0;  // beams in contact
+};
+
 class ImageFormation {
   public:
     virtual ~ImageFormation() = default;
@@ -75,6 +87,8 @@ class ImageFormation {
     // where they are in this frame, `mannequin`. Returns their number.
     using Pools = std::array<SceneChange::Pool, SceneChange::kMaxPools>;
     virtual std::size_t pools_of(const FrameInput&, Pools&) const { return 0; }
+    // Fills in what the model found for its last frame.
+    virtual void describe(RenderedFrame&) const {}
     // Row of the effect that frames leave out from now on, although it is on; -1: none.
     virtual void leave_out(int effect) = 0;
     // Renders the same picture by the slow, obvious renderer at level 0; never flipped.

@@ -126,6 +126,10 @@ class PhysicalFormation final : public ImageFormation {
         return static_cast<std::size_t>(count);
     }
 
+    void describe(RenderedFrame& rendered) const override {
+        if (!reference_) levels_.front()->fast->describe(rendered);
+    }
+
     void leave_out(int effect) override {
         switches_ = switches_without(kPhysicalEffects, chosen_, effect);
         shown_ = shown_by(switches_, machine_.structures);

@@ -40,7 +40,12 @@ Rigid ProbePress::at(const Rigid& mannequin_from_probe, double press_mm) {
     if (press_mm > 0)
         pose.translation = pose.translation + std::min(press_mm, kMaxPressMm) * inwards;
     press(pose);
-    pose.translation = pose.translation - field_.state().excess_mm * inwards;
+    return held_pose();
+}
+
+Rigid ProbePress::held_pose() const {
+    Rigid pose = pose_;
+    pose.translation = pose.translation - field_.state().excess_mm * pose.rotation.column(2);
     return pose;
 }
 

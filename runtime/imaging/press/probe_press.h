@@ -26,6 +26,7 @@ class ProbePress {
     // Presses a face at the pose, press_mm deeper; a pose that stays is solved once. Returns the
     // pose at which bone holds the face, which is that of the picture.
     Rigid at(const Rigid& mannequin_from_probe, double press_mm);
+    Rigid held_pose() const;  // what at() returned last
     // Another pressure in the veins for what follows; not above 0: the exercise's.
     void set_venous_pressure(double mmhg);
     // A needle that moves tissue, in the frame of the pose that at() returned.

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,7 +33,8 @@ struct TruthRenderer::Impl {
          SimdTarget s);
 
     // Presses the tissue as the frame does, and changes the input's pose to that of the picture.
-    void press(FrameInput& input, bool wants_entry);
+    // rendered: what the frame's renderer has found already.
+    void press(FrameInput& input, bool wants_entry, const RenderedFrame& rendered = {});
     // Loads the blocks that the plane meets, for bundles that are unpacked on demand.
     void ensure_loaded(const Rigid& pose);
     void lay_out_rows(const Rigid& pose);
@@ -65,7 +67,10 @@ struct TruthRenderer::Impl {
     std::unique_ptr<press::ProbePress> probe;  // null: effect deformation is off
     std::unique_ptr<press::PressView> press_view;
     std::vector<std::int32_t> closed_label;
-    const press::PressField* pressed = nullptr;  // in this frame; null: nothing moves
+    // In this frame, its renderer's or our own; null: the effect is off, nothing moves.
+    const press::ProbePress* pressing = nullptr;
+    const press::PressField* pressed = nullptr;
+    const press::PressView* shown_press = nullptr;
     std::vector<float> first_hard_mm;
     TruthFrameRows rows{};
     TruthFrameRows region_rows{};  // for the fine region
@@ -121,12 +126,18 @@ TruthRenderer::Impl::Impl(CaseView view,
     closed_label = press::closed_labels(*view);
 }
 
-void TruthRenderer::Impl::press(FrameInput& input, bool wants_entry) {
+void TruthRenderer::Impl::press(FrameInput& input,
+                                bool wants_entry,
+                                const RenderedFrame& rendered) {
     pressed = nullptr;
-    if (probe) {
+    shown_press = nullptr;
+    pressing = probe ? rendered.probe : nullptr;
+    if (pressing != nullptr) {
+        input.mannequin_from_probe = pressing->held_pose();
+    } else if (probe) {
+        pressing = probe.get();
         probe->set_venous_pressure(input.change.venous_pressure_mmhg);
         input.mannequin_from_probe = probe->at(input.mannequin_from_probe, input.settings.press_mm);
-        truth.press = probe->report();
         NeedleShape s;
         const NeedlePose& in = input.needle;
         probe->dent(needle_shape_of(input, s) ? bounded_dent(s.tip, s.axis, in.tent_mm, in.drag_mm)
@@ -137,11 +148,20 @@ void TruthRenderer::Impl::press(FrameInput& input, bool wants_entry) {
         const bool draws = options.model == ImageModel::physical && exercise.procedure.given();
         const int count = std::clamp(input.change.pool_count, 0, SceneChange::kMaxPools);
         probe->set_pools({pools.data(), draws ? static_cast<std::size_t>(count) : 0});
-        pressed = probe->moving();
-        if (pressed != nullptr) press_view->show(simd, *pressed);
+    }
+    if (pressing != nullptr) {
+        truth.press = pressing->report();
+        pressed = pressing->moving();
+    }
+    if (pressed != nullptr) {
+        shown_press = rendered.press_view;
+        if (shown_press == nullptr) {
+            press_view->show(simd, *pressed);
+            shown_press = press_view.get();
+        }
     }
     ensure_loaded(input.mannequin_from_probe);  // gaps and skin are read on the beams
-    look_up.begin(input.mannequin_from_probe, input.time_s, wants_entry, pressed);
+    look_up.begin(input.mannequin_from_probe, input.time_s, wants_entry, pressed, rendered);
 }
 
 void TruthRenderer::Impl::ensure_loaded(const Rigid& pose) {
@@ -193,7 +213,7 @@ void TruthRenderer::Impl::lay_out_rows(const Rigid& pose) {
     f.mm_per_px = static_cast<float>(px);
     f.origin_x_px = static_cast<float>(geometry.origin_x_px);
     f.origin_y_px = static_cast<float>(geometry.origin_y_px);
-    f.press = pressed != nullptr ? press_view.get() : nullptr;
+    f.press = shown_press;
     f.closed_label = closed_label.data();
     f.rays = pixels.rays();
     f.lines_per_ray = static_cast<float>(geometry.scanlines) / static_cast<float>(pixels.rays());
@@ -367,14 +387,18 @@ Result<TruthRenderer> TruthRenderer::create(CaseView bundle,
     return TruthRenderer(std::make_unique<Impl>(bundle, exercise, options, moves, simd));
 }
 
-const FrameTruth& TruthRenderer::render(const FrameInput& frame, const TruthPlanes& planes) {
+const FrameTruth& TruthRenderer::render(const FrameInput& frame,
+                                        const TruthPlanes& planes,
+                                        const Renderer* renderer) {
     Impl& m = *impl_;
     FrameInput input = frame;
     m.truth.posed = valid_pose(input.mannequin_from_probe);
     m.truth.pixels_of_label.fill(0);
     m.truth.shadowed_pixels_of_label.fill(0);
     if (!m.truth.posed) return m.truth;
-    m.press(input, !planes.skin_depth_mm.empty());
+    const std::optional<RenderedFrame> found =
+        renderer != nullptr ? renderer->rendered(frame) : std::optional<RenderedFrame>();
+    m.press(input, !planes.skin_depth_mm.empty(), found.value_or(RenderedFrame{}));
     m.lay_out_rows(input.mannequin_from_probe);
     const double wall_mm = m.vessels_move ? input.change.vein_wall_mm : 0;
     m.rows.vein_vx = static_cast<float>(wall_mm / m.bundle->grid.spacing_mm.x);
@@ -445,7 +469,7 @@ void TruthRenderer::Impl::needle_facts(const FrameInput& input) {
         std::abs(shape.tip.y) <= half_slab && in_image(exercise.probe, shape.tip.x, shape.tip.z);
     truth.needle_in_image_mm = length_in_image(
         exercise.probe, shape.tip - shape.length_mm * shape.axis, shape.tip, half_slab);
-    const Point3 tip = probe ? probe->at_rest(input.needle.tip) : input.needle.tip;
+    const Point3 tip = pressing != nullptr ? pressing->at_rest(input.needle.tip) : input.needle.tip;
     truth.tip_label = anatomy.label(anatomy.at_rest(tip, truth.time_s));
 }
 
@@ -457,7 +481,7 @@ void TruthRenderer::Impl::target_facts() {
         const Target& target = exercise.targets[i];
         TargetTruth& out = truth.targets[i];
         out.centre = anatomy.moved(target.centre, truth.time_s);
-        if (probe) out.centre = probe->current_position(out.centre);
+        if (pressing != nullptr) out.centre = pressing->current_position(out.centre);
         const Point3 p = probe_from_mannequin * out.centre;
         out.plane_mm = p.y;
         const double cut = target.radius_mm * target.radius_mm - p.y * p.y;

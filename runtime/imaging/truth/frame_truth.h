@@ -90,8 +90,13 @@ class TruthRenderer {
     TruthRenderer(TruthRenderer&&) noexcept;
     TruthRenderer& operator=(TruthRenderer&&) noexcept;
 
-    // A pose that is not rigid leaves the planes as they were. Cost: docs/python.md.
-    const FrameTruth& render(const FrameInput& input, const TruthPlanes& planes);
+    // A pose that is not rigid leaves the planes as they were. renderer: one of the same bundle,
+    // exercise and options. If its last frame was of this input, what it found for that frame (how
+    // the probe presses, where the beams touch) is not looked for again; the bytes are the same.
+    // Cost: docs/python.md.
+    const FrameTruth& render(const FrameInput& input,
+                             const TruthPlanes& planes,
+                             const Renderer* renderer = nullptr);
 
     // The same for one pixel, in double precision and one step after the other. column, row: in the
     // picture as it is shown, also where it is flipped. Cost: microseconds.

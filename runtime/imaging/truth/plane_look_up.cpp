@@ -104,18 +104,25 @@ PlaneLookUp::PlaneLookUp(CaseView bundle,
 void PlaneLookUp::begin(const Rigid& mannequin_from_probe,
                         double time_s,
                         bool wants_entry,
-                        const press::PressField* press) {
+                        const press::PressField* press,
+                        const RenderedFrame& rendered) {
     pose_ = mannequin_from_probe;
     press_ = press;
     motion_ = motion_at(breathing_motion_, pulsation_, std::isfinite(time_s) ? time_s : 0);
     contact_.any_gap = false;
     contact_.touching = geometry_.scanlines;
-    if (contact_on_) find_gaps_of_rays();
+    if (contact_on_ && !rendered.gaps_mm.empty()) {
+        contact_.touching = rendered.touching;
+        spread_gaps(rendered.gaps_mm);
+    } else if (contact_on_) {
+        find_gaps();
+        spread_gaps(gaps_);
+    }
     if (wants_entry) find_entries();
     if (wants_entry && press_ != nullptr && press_->state().pressed) press_entries();
 }
 
-void PlaneLookUp::find_gaps_of_rays() {
+void PlaneLookUp::find_gaps() {
     // The function that finds the picture's gaps reads no more of the scene than this.
     PhysicalScene scene;
     scene.bundle = &*bundle_;
@@ -123,21 +130,24 @@ void PlaneLookUp::find_gaps_of_rays() {
     scene.voxel_mm = bundle_->grid.spacing_mm.x;
     PhysicalFrame frame;
     frame.volume_from_probe = pose_;
-    find_gaps(scene, geometry_, frame, 0, geometry_.scanlines, raw_);
+    runtime::find_gaps(scene, geometry_, frame, 0, geometry_.scanlines, raw_);
     contact_.touching = smooth_gaps(geometry_, raw_, gaps_);
     if (press_ != nullptr) press_gaps(*press_, geometry_, gaps_);
+}
+
+void PlaneLookUp::spread_gaps(std::span<const float> gaps) {
     const auto rays = contact_.gap_mm.size();
     for (std::size_t i = 0; i < rays; ++i) {
         const double line =
             (static_cast<double>(i) + 0.5) * geometry_.scanlines / static_cast<double>(rays) - 0.5;
         const double at = std::clamp(line, 0.0, geometry_.scanlines - 1.0);
         const auto l = static_cast<std::size_t>(at);
-        const std::size_t next = std::min(l + 1, gaps_.size() - 1);
+        const std::size_t next = std::min(l + 1, gaps.size() - 1);
         const float part = static_cast<float>(at - static_cast<double>(l));
         // Beside a beam in air the nearer one decides.
-        const bool air = gaps_[l] < 0 || gaps_[next] < 0;
+        const bool air = gaps[l] < 0 || gaps[next] < 0;
         const float gap =
-            air ? gaps_[part < 0.5f ? l : next] : gaps_[l] + part * (gaps_[next] - gaps_[l]);
+            air ? gaps[part < 0.5f ? l : next] : gaps[l] + part * (gaps[next] - gaps[l]);
         contact_.gap_mm[i] = gap;
         contact_.any_gap = contact_.any_gap || gap != 0;
     }

@@ -12,6 +12,7 @@
 #include "formats/bundle/case_bundle.h"
 #include "formats/exercise/exercise.h"
 #include "formats/exercise/motion.h"
+#include "runtime/imaging/core/image_formation.h"
 #include "runtime/imaging/core/render_options.h"
 #include "runtime/imaging/core/scan_geometry.h"
 #include "runtime/imaging/press/press_field.h"
@@ -61,11 +62,13 @@ class PlaneLookUp {
                 int rays);
 
     // Begins a frame: finds where the beams touch and how the tissue has moved. press: the field of
-    // the picture; null: nothing is pressed. The pose is where bone holds the face.
+    // the picture; null: nothing is pressed. The pose is where bone holds the face. rendered: what a
+    // renderer of the same geometry found for it; its gaps are not looked for again.
     void begin(const Rigid& mannequin_from_probe,
                double time_s,
                bool wants_entry,
-               const press::PressField* press);
+               const press::PressField* press,
+               const RenderedFrame& rendered = {});
 
     const RayContact& contact() const { return contact_; }
     const MotionState& motion() const { return motion_; }
@@ -89,7 +92,8 @@ class PlaneLookUp {
     double entry_at(double ray) const;
 
   private:
-    void find_gaps_of_rays();
+    void find_gaps();
+    void spread_gaps(std::span<const float> gaps);
     void find_entries();
     void press_entries();
     double entry_along(PlanePoint origin, PlanePoint direction) const;

@@ -132,7 +132,9 @@ bool TruthPixels::scanned(int column, int row) const {
 }
 
 PlainTiles::PlainTiles(const ScanGeometry& g, const TruthPixels& pixels, double reach_mm)
-    : geometry_(g), across_((g.width_px + kColumns - 1) / kColumns) {
+    : geometry_(g),
+      across_((g.width_px + kColumns - 1) / kColumns),
+      half_mm_(0.5 * std::hypot(kColumns - 1, kRows - 1) * g.mm_per_px) {
     const int down = (g.height_px + kRows - 1) / kRows;
     tiles_.resize(static_cast<std::size_t>(across_) * down);
     label_.assign(tiles_.size(), -1);
@@ -151,11 +153,28 @@ PlainTiles::PlainTiles(const ScanGeometry& g, const TruthPixels& pixels, double 
             t.fade[end] = static_cast<float>(
                 std::exp(-static_cast<double>(t.r_mm[1 - end]) / reach_mm) * (0.999 + 0.002 * end) -
                 1e-6 * (1 - end));
+    for (std::size_t n = 0; n < tiles_.size(); ++n) lay_beam(n);
+}
+
+void PlainTiles::lay_beam(std::size_t tile) {
+    const ScanGeometry& g = geometry_;
+    const auto n = static_cast<int>(tile);
+    const int first_column = n % across_ * kColumns, first_row = n / across_ * kRows;
+    Tile& t = tiles_[tile];
+    t.x = (first_column + 0.5 * (kColumns - 1) - g.origin_x_px) * g.mm_per_px;
+    t.z = (first_row + 0.5 * (kRows - 1) - g.origin_y_px) * g.mm_per_px;
+    if (!g.fan) return;
+    const double away = std::hypot(t.x, t.z + g.radius_mm);
+    t.any_turn = away < 2 * half_mm_;
+    t.dx = t.x / away;
+    t.dz = (t.z + g.radius_mm) / away;
+    t.turn = half_mm_ / (away - half_mm_);
 }
 
 void PlainTiles::find(SimdTarget simd, const TruthFrameRows& f) {
     constexpr double kSlackVx = 0.05;  // more than places lose in single precision
     const double column = 0.5 * (kColumns - 1), row = 0.5 * (kRows - 1);
+    for (int a = 0; a < 3; ++a) beam_vx_[a] = std::hypot(f.beam_x[a], f.beam_z[a]);
     for (std::size_t n = 0; n < tiles_.size(); ++n) {
         label_[n] = -1;
         if (tiles_[n].rays[1] < 0) continue;
@@ -168,7 +187,10 @@ void PlainTiles::find(SimdTarget simd, const TruthFrameRows& f) {
             box.half[a] = kSlackVx + column * std::abs(f.across[a]) + row * std::abs(f.down[a]);
         }
         if (!move(simd, f, n, box)) continue;
-        if (f.weight != nullptr) breathe(f, box);
+        if (f.weight != nullptr) {
+            if (label_in(f, breathed_middle(f, box)) < 0) continue;  // most tiles fail here
+            breathe(f, box);
+        }
         const int label = label_in(f, box);
         if (label < 0) continue;
         if (f.press != nullptr && f.closed_label[label] != label) continue;
@@ -179,22 +201,8 @@ void PlainTiles::find(SimdTarget simd, const TruthFrameRows& f) {
 // Contact and pressing: false where no bound is known.
 bool PlainTiles::move(SimdTarget simd, const TruthFrameRows& f, std::size_t tile, Box& box) const {
     if (f.gap_mm == nullptr && f.press == nullptr) return true;
-    const ScanGeometry& g = geometry_;
     const Tile& t = tiles_[tile];
-    const auto n = static_cast<int>(tile);
-    const int first_column = n % across_ * kColumns, first_row = n / across_ * kRows;
-    const double x = (first_column + 0.5 * (kColumns - 1) - g.origin_x_px) * g.mm_per_px,
-                 z = (first_row + 0.5 * (kRows - 1) - g.origin_y_px) * g.mm_per_px;
-    const double half_mm = 0.5 * std::hypot(kColumns - 1, kRows - 1) * g.mm_per_px;
-    // The beam through the tile's middle, and how far those of its pixels turn away from it.
-    double dx = 0, dz = 1, turn = 0;
-    if (g.fan) {
-        const double away = std::hypot(x, z + g.radius_mm);
-        if (away < 2 * half_mm) return false;
-        dx = x / away;
-        dz = (z + g.radius_mm) / away;
-        turn = half_mm / (away - half_mm);
-    }
+    if (t.any_turn) return false;
     double along[2] = {0, 0}, side[2] = {0, 0};
     if (f.gap_mm != nullptr) {
         const auto [least, most] =
@@ -208,7 +216,7 @@ bool PlainTiles::move(SimdTarget simd, const TruthFrameRows& f, std::size_t tile
         if (!v.field->pools().empty()) return false;
         const NeedleDent& needle = v.field->needle();
         if (needle.moves() &&
-            std::hypot(x - needle.tip.x, z - needle.tip.z) < kDentReachMm + half_mm)
+            std::hypot(t.x - needle.tip.x, t.z - needle.tip.z) < kDentReachMm + half_mm_)
             return false;
         if (v.pressed && !v.columns_follow_beams) return false;
         if (v.pressed) {
@@ -232,15 +240,30 @@ bool PlainTiles::move(SimdTarget simd, const TruthFrameRows& f, std::size_t tile
     }
     const double middle = 0.5 * (along[0] + along[1]), beside = 0.5 * (side[0] + side[1]);
     const double half = 0.5 * (along[1] - along[0]), half_side = 0.5 * (side[1] - side[0]);
-    const double turned = turn * (std::abs(middle) + half + std::abs(beside) + half_side);
+    const double turned = t.turn * (std::abs(middle) + half + std::abs(beside) + half_side);
     for (int a = 0; a < 3; ++a) {
-        const double u = dx * f.beam_x[a] + dz * f.beam_z[a],
-                     v = dz * f.beam_x[a] - dx * f.beam_z[a];
+        const double u = t.dx * f.beam_x[a] + t.dz * f.beam_z[a],
+                     v = t.dz * f.beam_x[a] - t.dx * f.beam_z[a];
         box.middle[a] += middle * u + beside * v;
-        box.half[a] += half * std::abs(u) + half_side * std::abs(v) +
-                       turned * std::hypot(f.beam_x[a], f.beam_z[a]);
+        box.half[a] += half * std::abs(u) + half_side * std::abs(v) + turned * beam_vx_[a];
     }
     return true;
+}
+
+// A place that the box, breathed, holds: its middle, moved by the weight of the cell it lies in.
+PlainTiles::Box PlainTiles::breathed_middle(const TruthFrameRows& f, const Box& box) {
+    int node[3];
+    for (int a = 0; a < 3; ++a)
+        node[a] = static_cast<int>(
+            std::clamp((box.middle[a] - f.first_vx[a]) * f.per_voxel, 0.0, f.lattice[a] - 2.0));
+    const double weight =
+        f.weight[(std::ptrdiff_t{node[2]} * f.lattice[1] + node[1]) * f.lattice[0] + node[0]];
+    Box place;
+    for (int a = 0; a < 3; ++a) {
+        place.middle[a] = box.middle[a] - weight * f.shift_vx[a];
+        place.half[a] = 0;
+    }
+    return place;
 }
 
 // Breathing: by as much as the least and the greatest weight of the cells that the box meets.

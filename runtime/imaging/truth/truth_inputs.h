@@ -5,6 +5,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -71,12 +72,19 @@ class TruthPixels {
     // Sets the pixels outside the scanned area, which no run visits.
     template <class T>
     void set_outside(std::span<T> plane, T value) const {
+        std::array<T, 64> block;  // copied whole: std::fill takes numbers one by one
+        block.fill(value);
         std::size_t at = 0;
+        const auto fill_to = [&](std::size_t end) {
+            for (; at + block.size() <= end; at += block.size())
+                std::copy(block.begin(), block.end(), plane.data() + at);
+            std::copy_n(block.begin(), end - at, plane.data() + at);
+        };
         for_each_run([&](const TruthRun& run, std::size_t begin) {
-            std::fill(plane.data() + at, plane.data() + begin, value);
+            fill_to(begin);
             at = begin + static_cast<std::size_t>(run.count);
         });
-        std::fill(plane.data() + at, plane.data() + plane.size(), value);
+        fill_to(plane.size());
     }
 
   private:
@@ -108,16 +116,24 @@ class PlainTiles {
         int rays[2] = {1 << 30, -1};  // the least and the greatest of its scanned pixels
         float r_mm[2] = {1e9f, -1e9f};
         float fade[2] = {0, 1};  // of the gap that contact closes
+        // Its middle in the scan plane, mm; the beam through it, and how far those of its pixels
+        // turn away from it. any_turn: so near the virtual apex that no bound is known.
+        double x = 0, z = 0, dx = 0, dz = 1, turn = 0;
+        bool any_turn = false;
     };
     struct Box {
         double middle[3], half[3];  // voxels
     };
+    void lay_beam(std::size_t tile);
     bool move(SimdTarget simd, const TruthFrameRows& f, std::size_t tile, Box& box) const;
+    static Box breathed_middle(const TruthFrameRows& f, const Box& box);
     static void breathe(const TruthFrameRows& f, Box& box);
     static int label_in(const TruthFrameRows& f, const Box& box);
 
     const ScanGeometry& geometry_;
     int across_ = 0;
+    double half_mm_ = 0;      // from a tile's middle to its corners
+    double beam_vx_[3] = {};  // length of the beams' plane along each axis, per mm; of a frame
     std::vector<Tile> tiles_;
     std::vector<std::int16_t> label_;
 };

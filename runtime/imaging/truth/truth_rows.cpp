@@ -137,49 +137,55 @@ HWY_INLINE void breathe_back(D d, const TruthFrameRows& f, Places<D>& p) {
     const hn::RebindToSigned<D> di;
     using V = hn::Vec<D>;
     const V one = hn::Set(d, 1.0f);
-    const V voxel[3] = {p.x, p.y, p.z};
-    V share[3][2];
-    IntOf<D> cell[3];
-    for (int a = 0; a < 3; ++a) {
-        const V at = hn::Mul(hn::Sub(voxel[a], hn::Set(d, f.first_vx[a])), hn::Set(d, f.per_voxel));
+    // Cell of the lattice along an axis, and the shares of its ends.
+    const auto along = [&](V voxel, int a, V& near, V& far) HWY_ATTR {
+        const V at = hn::Mul(hn::Sub(voxel, hn::Set(d, f.first_vx[a])), hn::Set(d, f.per_voxel));
         const V last = hn::Set(d, static_cast<float>(f.lattice[a] - 1));
         const V bounded = hn::Min(hn::Max(at, hn::Zero(d)), last);
         const V low = hn::Min(hn::Floor(bounded), hn::Sub(last, one));
-        share[a][1] = hn::Sub(bounded, low);
-        share[a][0] = hn::Sub(one, share[a][1]);
-        cell[a] = hn::ConvertTo(di, low);
-    }
-    const std::ptrdiff_t row = f.lattice[0], plane = row * f.lattice[1];
-    const auto rows = hn::Add(hn::Mul(cell[2], hn::Set(di, f.lattice[1])), cell[1]);
-    const auto index = hn::Add(hn::Mul(rows, hn::Set(di, f.lattice[0])), cell[0]);
-    // A vector of pixels meets few cells: spreading the corners of each over its lanes takes less
-    // time than gathering them.
-    V c000 = hn::Zero(d), c001 = c000, c010 = c000, c011 = c000;
-    V c100 = c000, c101 = c000, c110 = c000, c111 = c000;
-    HWY_ALIGN std::int32_t cells[kMaxLanes];
-    hn::Store(index, di, cells);
-    auto left = hn::Eq(index, index);
-    do {
-        const std::int32_t here = cells[hn::FindKnownFirstTrue(di, left)];
-        const auto same = hn::Eq(index, hn::Set(di, here));
-        const auto lanes = hn::RebindMask(d, same);
-        const float* from = f.weight + here;
-        const auto spread = [&](V& corner, const float* weight) HWY_ATTR {
-            corner = hn::IfThenElse(lanes, hn::Set(d, *weight), corner);
-        };
-        spread(c000, from), spread(c001, from + 1);
-        spread(c010, from + row), spread(c011, from + row + 1);
-        spread(c100, from + plane), spread(c101, from + plane + 1);
-        spread(c110, from + plane + row), spread(c111, from + plane + row + 1);
-        left = hn::AndNot(same, left);
-    } while (!hn::AllFalse(di, left));
-    V sum = hn::Zero(d);
-    const auto add = [&](int z, int y, V first, V second) HWY_ATTR {
-        const V across = hn::Mul(share[2][z], share[1][y]);
-        sum = hn::Add(sum, hn::Mul(hn::Mul(across, share[0][0]), first));
-        sum = hn::Add(sum, hn::Mul(hn::Mul(across, share[0][1]), second));
+        far = hn::Sub(bounded, low);
+        near = hn::Sub(one, far);
+        return hn::ConvertTo(di, low);
     };
-    add(0, 0, c000, c001), add(0, 1, c010, c011), add(1, 0, c100, c101), add(1, 1, c110, c111);
+    V x0, x1, y0, y1, z0, z1;
+    const auto i = along(p.x, 0, x0, x1), j = along(p.y, 1, y0, y1), k = along(p.z, 2, z0, z1);
+    const std::ptrdiff_t row = f.lattice[0], plane = row * f.lattice[1];
+    const auto rows = hn::Add(hn::Mul(k, hn::Set(di, f.lattice[1])), j);
+    const auto index = hn::Add(hn::Mul(rows, hn::Set(di, f.lattice[0])), i);
+    // A vector of pixels meets few cells, mostly one: spreading the corners of each over its lanes
+    // takes less time than gathering them.
+    const std::int32_t cell = hn::GetLane(index);
+    const float* first = f.weight + cell;
+    V c000 = hn::Set(d, first[0]), c001 = hn::Set(d, first[1]);
+    V c010 = hn::Set(d, first[row]), c011 = hn::Set(d, first[row + 1]);
+    V c100 = hn::Set(d, first[plane]), c101 = hn::Set(d, first[plane + 1]);
+    V c110 = hn::Set(d, first[plane + row]), c111 = hn::Set(d, first[plane + row + 1]);
+    auto left = hn::Ne(index, hn::Set(di, cell));
+    if (!hn::AllFalse(di, left)) {
+        HWY_ALIGN std::int32_t cells[kMaxLanes];
+        hn::Store(index, di, cells);
+        do {
+            const std::int32_t here = cells[hn::FindKnownFirstTrue(di, left)];
+            const auto same = hn::Eq(index, hn::Set(di, here));
+            const auto lanes = hn::RebindMask(d, same);
+            const float* from = f.weight + here;
+            const auto spread = [&](V& corner, const float* weight) HWY_ATTR {
+                corner = hn::IfThenElse(lanes, hn::Set(d, *weight), corner);
+            };
+            spread(c000, from), spread(c001, from + 1);
+            spread(c010, from + row), spread(c011, from + row + 1);
+            spread(c100, from + plane), spread(c101, from + plane + 1);
+            spread(c110, from + plane + row), spread(c111, from + plane + row + 1);
+            left = hn::AndNot(same, left);
+        } while (!hn::AllFalse(di, left));
+    }
+    V sum = hn::Zero(d);
+    const auto add = [&](V share, V low, V high) HWY_ATTR {
+        sum = hn::Add(sum, hn::Mul(hn::Mul(share, x0), low));
+        sum = hn::Add(sum, hn::Mul(hn::Mul(share, x1), high));
+    };
+    add(hn::Mul(z0, y0), c000, c001), add(hn::Mul(z0, y1), c010, c011);
+    add(hn::Mul(z1, y0), c100, c101), add(hn::Mul(z1, y1), c110, c111);
     p.x = hn::Sub(p.x, hn::Mul(sum, hn::Set(d, f.shift_vx[0])));
     p.y = hn::Sub(p.y, hn::Mul(sum, hn::Set(d, f.shift_vx[1])));
     p.z = hn::Sub(p.z, hn::Mul(sum, hn::Set(d, f.shift_vx[2])));
@@ -230,16 +236,17 @@ HWY_INLINE Voxels<D> voxels_of(D d, const TruthFrameRows& f, const Places<D>& p)
     const hn::RebindToSigned<D> di;
     using I = IntOf<D>;
     // TruthRenderer draws no frame so far away that this is not exact.
-    const hn::RebindToUnsigned<D> du;
     const auto shift = hn::Set(d, kRoundingShift);
     const auto bits = hn::Set(di, kRoundingBits);
     const auto hx = hn::Add(p.x, shift), hy = hn::Add(p.y, shift), hz = hn::Add(p.z, shift);
     const I i = hn::Sub(hn::BitCast(di, hx), bits), j = hn::Sub(hn::BitCast(di, hy), bits),
             k = hn::Sub(hn::BitCast(di, hz), bits);
-    const auto in = [&](I v, int axis) HWY_ATTR {
-        return hn::Lt(hn::BitCast(du, v), hn::Set(du, static_cast<std::uint32_t>(f.size[axis])));
+    // An index is inside where neither it nor what is left to the last one is negative.
+    const auto beyond = [&](I v, int axis) HWY_ATTR {
+        return hn::Or(v, hn::Sub(hn::Set(di, f.size[axis] - 1), v));
     };
-    const auto inside = hn::RebindMask(di, hn::And(in(i, 0), hn::And(in(j, 1), in(k, 2))));
+    const auto inside =
+        hn::Not(hn::Lt(hn::Or(beyond(i, 0), hn::Or(beyond(j, 1), beyond(k, 2))), hn::Zero(di)));
     const auto three = hn::Set(di, 3);
     const I brick = hn::Add(hn::ShiftRight<2>(i),
                             hn::Add(hn::Mul(hn::ShiftRight<2>(j), hn::Set(di, f.bricks_x)),

@@ -66,11 +66,13 @@ std::string exercise_toml(const Exercise& base,
                           const Rigid& mannequin_from_probe) {
     const Probe& probe = base.probe;
     const Point3 start = mannequin_from_probe * Point3{0, 0, 0};
-    const Vector3 beam = mannequin_from_probe.rotation * Vector3{0, 0, 1};
+    const Vector3 beam = mannequin_from_probe.rotation.column(2),
+                  lateral = mannequin_from_probe.rotation.column(0);
     std::string out = "name = " + quoted(exercise_name(title)) + "\ntitle = " + quoted(title) +
                       "\nkind = " + quoted(base.kind) + "\nmodel = " + quoted(base.model) + "\n";
     out += line("start_probe = [%.2f, %.2f, %.2f]\n", start.x, start.y, start.z);
     out += line("start_beam = [%.5f, %.5f, %.5f]\n", beam.x, beam.y, beam.z);
+    out += line("start_lateral = [%.5f, %.5f, %.5f]\n", lateral.x, lateral.y, lateral.z);
     out += "start_spread_mm = 30\n";
     if (!base.no_go.empty()) {
         out += "no_go = [";

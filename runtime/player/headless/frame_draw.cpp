@@ -22,7 +22,7 @@ struct Stand {
 
 Stand on_sweep(const Exercise& exercise, Draw& draw) {
     if (exercise.sweeps.empty())
-        return {exercise.start_probe, exercise.start_beam, {1, 0, 0}, true};
+        return {exercise.start_probe, exercise.start_beam, exercise.start_lateral, true};
     const Sweep& sweep = exercise.sweeps[draw.below(exercise.sweeps.size())];
     const SweepKey& a = sweep.keys[draw.below(sweep.keys.size())];
     const std::size_t i = &a - sweep.keys.data();
@@ -133,7 +133,7 @@ DrawnFrame draw_frame(const DatasetRecipe& r,
     Draw draw(seed, 1, frame);
     const Skin skin(bundle);
     DrawnFrame drawn;
-    Rigid pose = turned(exercise.start_probe, exercise.start_beam, {1, 0, 0}, r, draw);
+    Rigid pose = turned(exercise.start_probe, exercise.start_beam, exercise.start_lateral, r, draw);
     for (int n = 0; n < kTries && !drawn.on_skin; ++n) {
         const Stand stand =
             r.region == "skin" ? on_surface(bundle, areas, skin, draw) : on_sweep(exercise, draw);

@@ -234,7 +234,7 @@ Status make_chunk(const DatasetPlan& plan, const DatasetSource& source, std::uin
         again.input = drawn.input;
         const FrameStatus status = engine.frame_again(again, pixels);
         if (Status read = bundle_health(*source.open); !read) return read;
-        const FrameTruth& facts = truth.render(drawn.input, planes.planes());
+        const FrameTruth& facts = truth.render(drawn.input, planes.planes(), &engine.renderer());
         std::string line =
             record_of(plan, source, set_up, chunk, frame, drawn, engine.renderer().layout()).dump();
         line.pop_back();

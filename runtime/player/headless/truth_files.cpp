@@ -165,7 +165,7 @@ Result<std::unique_ptr<TruthFiles>> TruthFiles::in(const std::string& folder,
 
 Status TruthFiles::add(int frame, const FrameInput& input, FrameStatus status, double& ms) {
     const double before_s = steady_seconds();
-    const FrameTruth& truth = truth_.render(input, buffers_.planes());
+    const FrameTruth& truth = truth_.render(input, buffers_.planes(), &engine_.renderer());
     ms = (steady_seconds() - before_s) * 1e3;
     lines_ += truth_json(truth, frame, status, bundle_->labels, engine_.exercise()) + "\n";
     if (!truth.posed) return Done{};

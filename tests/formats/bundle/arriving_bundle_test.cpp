@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "formats/bundle/case_bundle.h"
+#include "support/hard_case.h"
 #include "support/random.h"
 #include "support/tiny_case.h"
 
@@ -141,14 +142,18 @@ TEST(ArrivingBundle, OpensWithLittleAndIsWholeInTheEnd) {
     EXPECT_TRUE(streamed.arrivals()->whole() && streamed.has_textures());
     EXPECT_TRUE(blocks.whole() && blocks.status());
     const Int3 size = bundle.grid.size;
+    int off = 0;
     for (int k = 0; k < size.z; ++k) {
         for (int j = 0; j < size.y; ++j) {
             for (int i = 0; i < size.x; ++i) {
-                ASSERT_EQ(streamed->boundary.at(i, j, k), bundle.boundary.at(i, j, k));
-                ASSERT_EQ(streamed->echo_offset.at(i, j, k), bundle.echo_offset.at(i, j, k));
+                off += streamed->boundary.at(i, j, k) != bundle.boundary.at(i, j, k) ||
+                       streamed->echo_offset.at(i, j, k) != bundle.echo_offset.at(i, j, k);
             }
         }
     }
+    testing::HardCase voxels("voxels off once all blocks are there", testing::HardCase::at_most, 0,
+                             "");
+    voxels.see(off);
     ASSERT_EQ(streamed->textures.size(), bundle.textures.size());
     for (std::size_t n = 0; n < bundle.textures.size(); ++n)
         EXPECT_EQ(streamed->textures[n].voxels, bundle.textures[n].voxels);

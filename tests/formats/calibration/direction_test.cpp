@@ -99,6 +99,26 @@ TEST(Direction, StrayPosesAreLeftOut) {
     EXPECT_LT(fit.inliers, 85);
 }
 
+// Two strokes there and two back: pairs of poses half a recording apart lie at one place.
+TEST(Direction, BackAndForthHasTheSignOfItsFirstStroke) {
+    Random random(6);
+    HardCase off("direction of a sweep there and back twice, noise of 0.5 mm, off",
+                 HardCase::at_most, 0.6, "degrees");
+    for (int draw = 0; draw < 50; ++draw) {
+        const Vector3 truth = random.direction();
+        std::vector<Pose> poses = sweep(truth, 0.5, random);
+        const std::vector<Pose> straight = poses;
+        for (std::size_t i = 0; i < poses.size(); ++i) {
+            const std::size_t at = 4 * i % 200;
+            poses[i].tracker_from_tool = straight[at < 100 ? at : 199 - at].tracker_from_tool;
+        }
+        const DirectionFit fit = fit_direction(poses);
+        EXPECT_TRUE(fit.back_and_forth);
+        EXPECT_FALSE(fit.warnings.empty());
+        off.see(angle(fit.direction, truth) / kRadPerDeg);
+    }
+}
+
 TEST(Direction, StillShortAndCurvedSweepsSaySo) {
     Random random(5);
     EXPECT_FALSE(fit_direction(sweep({1, 0, 0}, 0, random, 0)).determined);

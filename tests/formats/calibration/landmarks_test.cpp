@@ -103,16 +103,26 @@ TEST(Landmarks, OneBadPairIsNamed) {
 
 TEST(Landmarks, ExchangedAndMirroredAreRecognised) {
     Random random(5);
-    Pairs p = pairs(4, 0.5, random);
-    std::vector<Point3> swapped = p.to;
-    std::swap(swapped[1], swapped[2]);
-    EXPECT_TRUE(says(fit_rigid(p.from, swapped), "exchanged"));
-    std::vector<Point3> mirrored = p.from;
-    for (Point3& q : mirrored) q.x = -q.x;
-    EXPECT_TRUE(says(fit_rigid(mirrored, p.to), "mirror"));
-    std::vector<Point3> cm = p.from;
-    for (Point3& q : cm) q = {q.x / 10, q.y / 10, q.z / 10};
-    EXPECT_TRUE(says(fit_rigid(cm, p.to), "scale of"));
+    int exchanged = 0, in_the_mirror = 0;
+    for (int draw = 0; draw < 100; ++draw) {
+        Pairs p = pairs(6, 0.5, random);
+        std::vector<Point3> swapped = p.to;
+        std::swap(swapped[1], swapped[2]);
+        exchanged += says(fit_rigid(p.from, swapped), "exchanged");
+        std::vector<Point3> mirrored = p.from;
+        for (Point3& q : mirrored) q.x = -q.x;
+        in_the_mirror += says(fit_rigid(mirrored, p.to), "mirror");
+        std::vector<Point3> cm = p.from;
+        for (Point3& q : cm) q = {q.x / 10, q.y / 10, q.z / 10};
+        EXPECT_TRUE(says(fit_rigid(cm, p.to), "scale of"));
+        EXPECT_FALSE(says(fit_rigid(p.from, p.to), "exchanged"));
+        EXPECT_FALSE(says(fit_rigid(p.from, p.to), "mirror"));
+    }
+    testing::HardCase two("of 100 sets of six landmarks, two of them exchanged, missed",
+                          testing::HardCase::at_most, 0, "");
+    two.see(100 - exchanged);
+    testing::HardCase mirror("of 100 mirrored ones, missed", testing::HardCase::at_most, 0, "");
+    mirror.see(100 - in_the_mirror);
 }
 
 TEST(Landmarks, TooFewOnALineAndInOnePlace) {
@@ -229,6 +239,9 @@ TEST(SkinSweep, PatchLeavesASlideAndSaysSo) {
     const RigidFit fit = fit_skin_sweep(ball, readings, options);
     EXPECT_FALSE(fit.determined && fit.warnings.empty());
     EXPECT_TRUE(says(fit, "sweep"));
+    testing::HardCase condition("condition of a fit that slides", testing::HardCase::at_least, 50,
+                                "");
+    condition.see(fit.condition);
 }
 
 TEST(SkinSweep, TooFewReadingsAndNoSurface) {

@@ -145,6 +145,8 @@ TEST(PointTrouble, StillSensorTooFewAndTwoPosesHaveTheirOwnWords) {
 TEST(PointTrouble, EveryKindOfBadRowIsNamedAndLeftOut) {
     HardCase tip("tip, twenty of a hundred rows spoilt in each of eight ways", HardCase::at_most,
                  0.1, "mm");
+    HardCase numbers("tip, NaN, infinity, 1e308 mm or other units in twenty of a hundred rows",
+                     HardCase::at_most, 0.1, "mm");
     Random random(11);
     PivotMotion motion;
     motion.noise_mm = 0.1;
@@ -156,7 +158,9 @@ TEST(PointTrouble, EveryKindOfBadRowIsNamedAndLeftOut) {
         EXPECT_TRUE(fit.determined) << words;
         EXPECT_TRUE(says(fit, words)) << words;
         EXPECT_EQ(fit.poses, 80) << words;
-        tip.see(norm(fit.tip_mm - motion.tip_mm));
+        const bool number =
+            std::string(words) == "NaN" || std::string(words) == "units are mixed" || !*words;
+        (number ? numbers : tip).see(norm(fit.tip_mm - motion.tip_mm));
     };
     check("status other than OK", [](Pose& p) { p.ok = false; });
     check("NaN", [](Pose& p) { p.tracker_from_tool.translation.y = NAN; });
@@ -167,6 +171,8 @@ TEST(PointTrouble, EveryKindOfBadRowIsNamedAndLeftOut) {
     check("mirrored", [](Pose& p) {
         for (std::size_t k = 0; k < 3; ++k) p.tracker_from_tool.rotation.m[k] *= -1;
     });
+    // Whatever it is called.
+    check("", [](Pose& p) { p.tracker_from_tool.translation.x = 1e308; });
     for (double f : {1e-3, 1e3, 1 / 25.4}) {
         check("units are mixed", [f](Pose& p) {
             p.tracker_from_tool.translation = f * p.tracker_from_tool.translation;
@@ -229,18 +235,29 @@ TEST(PointTrouble, QuaternionSignFlips) {
 
 TEST(PointTrouble, WrongConventionsAreRecognised) {
     Random random(14);
-    PivotMotion motion;
-    motion.noise_mm = 0.2;
-    const std::vector<Pose> poses = pivot_recording(motion, random);
-    std::vector<Pose> transposed = poses, inverted = poses, metres = poses;
-    for (std::size_t i = 0; i < poses.size(); ++i) {
-        transposed[i].tracker_from_tool.rotation = transpose(poses[i].tracker_from_tool.rotation);
-        inverted[i].tracker_from_tool = inverse(poses[i].tracker_from_tool);
-        metres[i].tracker_from_tool.translation = 1e-3 * poses[i].tracker_from_tool.translation;
+    int named = 0, alarms = 0;
+    for (int draw = 0; draw < 20; ++draw) {
+        PivotMotion motion;
+        motion.noise_mm = 0.2;
+        const std::vector<Pose> poses = pivot_recording(motion, random);
+        std::vector<Pose> transposed = poses, inverted = poses, metres = poses;
+        for (std::size_t i = 0; i < poses.size(); ++i) {
+            const Rigid& pose = poses[i].tracker_from_tool;
+            transposed[i].tracker_from_tool.rotation = transpose(pose.rotation);
+            inverted[i].tracker_from_tool = inverse(pose);
+            metres[i].tracker_from_tool.translation = 1e-3 * pose.translation;
+        }
+        named += says(fit_point(transposed), "transposed");
+        named += says(fit_point(inverted), "inverse poses");
+        named += says(fit_point(metres), "metres");
+        const PointFit right = fit_point(poses);
+        for (const char* words : {"transposed", "inverse poses", "metres"})
+            alarms += says(right, words);
     }
-    EXPECT_TRUE(says(fit_point(transposed), "transposed"));
-    EXPECT_TRUE(says(fit_point(inverted), "inverse poses"));
-    EXPECT_TRUE(says(fit_point(metres), "metres"));
+    HardCase wrong("of 60 recordings of another convention, named", HardCase::at_least, 60, "");
+    wrong.see(named);
+    HardCase alarm("of 20 right ones, called wrong", HardCase::at_most, 0, "");
+    alarm.see(alarms);
 }
 
 }  // namespace

@@ -20,6 +20,7 @@ effects = ["speckle", "shadow"]
 no_go = ["aorta", "bowel"]
 start_probe = [10, 20.5, 30]
 start_beam = [0, 0, -2]
+start_lateral = [0, 3, 1]
 
 [probe]
 shape = "curvilinear"
@@ -82,6 +83,8 @@ TEST(Exercise, ReadsEveryKey) {
     EXPECT_EQ(e->effects, (std::vector<std::string>{"speckle", "shadow"}));
     EXPECT_EQ(e->no_go.size(), 2u);
     EXPECT_EQ(e->start_beam, (Vector3{0, 0, -1}));
+    EXPECT_EQ(start_pose(*e).rotation.column(0), (Vector3{0, 1, 0}));
+    EXPECT_EQ(start_pose(*e).rotation.column(2), (Vector3{0, 0, -1}));
     EXPECT_NEAR(e->probe.field_of_view_rad, 70 * kRadPerDeg, 1e-12);
     EXPECT_EQ(e->probe.depth_mm, 160);
     EXPECT_EQ(e->needle.bend_max_weight, 0.8);

@@ -40,6 +40,10 @@ TEST(SuggestName, TheMistypedOptionIsNamed) {
     const std::vector<std::string> known{"--labels", "--out", "-o", "--mesh"};
     const auto of = [&](std::vector<std::string> words) { return unknown_option(words, known); };
     EXPECT_EQ(of({"--lables", "x"}), "--lables is no option; did you mean --labels?");
+    EXPECT_EQ(unknown_option(std::vector<std::string>{"--labls"},
+                             std::vector<std::string>{"--table", "-l", "--out"}),
+              "--labls is no option");  // two of five letters differ
+    EXPECT_EQ(of({"--labls"}), "--labls is no option; did you mean --labels?");
     EXPECT_EQ(of({"--out=a", "--voxel=3"}), "--voxel is no option");
     EXPECT_EQ(of({"--labels", "--", "--lables"}), "");
     EXPECT_EQ(of({"-5", "-o", "--mesh"}), "");

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "support/hard_case.h"
+
 namespace sonocase {
 namespace {
 
@@ -15,6 +17,19 @@ TomlTable parsed(std::string_view text) {
 
 std::string fault_of(const TomlTable& table) {
     return table.fault() ? table.fault()->message() : "";
+}
+
+// Behind a value only white space may stand, which these letters are not.
+TEST(TomlReader, NoLetterBeyondAsciiIsWhiteSpace) {
+    int taken = 0;
+    for (int letter = 0xA1; letter <= 0x499; ++letter) {
+        const std::string text = "a = 1" + std::string{static_cast<char>(0xC0 | letter >> 6),
+                                                       static_cast<char>(0x80 | (letter & 0x3F))};
+        taken += TomlTable::parse(text, "a.toml").has_value();
+    }
+    testing::HardCase spaces("of the 1,017 letters U+00A1 to U+0499, taken for white space",
+                             testing::HardCase::at_most, 0, "");
+    spaces.see(taken);
 }
 
 TEST(TomlReader, ReadsEveryKindOfValue) {

@@ -69,6 +69,9 @@ TEST(Aim, WritesAnExerciseThatReads) {
     // The needle stays in the plane of the image.
     const SweepKey& key = sweep.keys[0];
     EXPECT_NEAR(dot(key.needle_direction, cross(key.beam, key.lateral)), 0, 1e-3);
+    // The exercise begins in that plane.
+    EXPECT_NEAR(dot(start_pose(*exercise).rotation.column(1), cross(key.beam, key.lateral)), 1,
+                1e-3);
     EXPECT_FALSE(aim_picture(labels, kLesion, result).empty());
 }
 

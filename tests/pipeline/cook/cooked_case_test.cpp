@@ -106,6 +106,38 @@ TEST(ExerciseFrame, PositionsGoThroughTheMapAndTheNeedleStaysInThePlane) {
     EXPECT_TRUE(cooked->stages.back().report.warnings.empty());  // the target lies in the liver
 }
 
+// The plane in which an exercise begins goes through the map as the plane of a script's key does.
+TEST(ExerciseFrame, TheFirstPlaneIsThatOfAKeyAtTheSamePlace) {
+    const std::string place = "probe = [80, 130, 70]\n", towards = "beam = [0, -1, 0]\n",
+                      along = "lateral = [0.6, 0, 0.8]\n";
+    const auto mapped = exercise_to_mannequin(
+        "name = \"a\"\nkind = \"scan\"\nstart_" + place + "start_" + towards + "start_" + along +
+            "[[sweeps]]\nname = \"still\"\n[[sweeps.keys]]\ntime_s = 0\n" + place + towards + along,
+        "a.toml", analytic_torso_truth());
+    ASSERT_TRUE(mapped) << mapped.error().message();
+    const auto exercise = parse_exercise(*mapped, "a.toml");
+    ASSERT_TRUE(exercise) << exercise.error().message();
+    const SweepKey& key = exercise->sweeps[0].keys[0];
+    const Rigid start = start_pose(*exercise);
+    EXPECT_LT(norm(start.rotation.column(2) - key.beam), 1e-4);
+    EXPECT_LT(norm(start.rotation.column(0) - key.lateral), 1e-4);
+    // Where none is given, it lies across the patient.
+    const auto plain = exercise_to_mannequin("name = \"a\"\nstart_" + place + "start_" + towards,
+                                             "a.toml", analytic_torso_truth());
+    ASSERT_TRUE(plain) << plain.error().message();
+    const auto of_patient = parse_exercise(*plain, "a.toml");
+    ASSERT_TRUE(of_patient) << of_patient.error().message();
+    const Point3 skin = mannequin_from_ct(analytic_torso_truth(), {80, 130, 70});
+    const Vector3 right = mannequin_from_ct(analytic_torso_truth(), {81, 130, 70}) - skin;
+    EXPECT_GT(dot(start_pose(*of_patient).rotation.column(0), normalized(right)), 0.98);
+    // A beam along that direction has another.
+    const auto along_x =
+        exercise_to_mannequin("name = \"a\"\nstart_" + place + "start_beam = [-1, 0, 0]\n",
+                              "a.toml", analytic_torso_truth());
+    ASSERT_TRUE(along_x) << along_x.error().message();
+    EXPECT_TRUE(parse_exercise(*along_x, "a.toml"));
+}
+
 TEST(ExerciseFrame, FramesAreStrippedInPlaceAndStrangersRefused) {
     const auto framed = strip_frame("name = \"a\"\nframe = \"ct\"\ntitle = \"b\"\n", "a.toml");
     ASSERT_TRUE(framed.has_value());

@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "formats/files/load_save.h"
+#include "support/hard_case.h"
 #include "support/run_command.h"
 #include "support/temporary_folder.h"
 
@@ -127,6 +128,9 @@ TEST(UltrasoundFilm, IsThatOfThePicturesBesideTheRecording) {
     const auto film = film_of_session(folder / "x.igs.mha");
     ASSERT_TRUE(film) << film.error().message();
     EXPECT_EQ(film->times_s, (std::vector<double>{0, 1}));  // neither out of order nor rescaled
+    sonocase::testing::HardCase taken("of two pictures of another scale or out of order, taken",
+                                      sonocase::testing::HardCase::at_most, 0, "");
+    taken.see(static_cast<double>(film->times_s.size()) - 2);
     EXPECT_EQ(film->mm_per_px, 0.25);
     EXPECT_EQ(film->origin_x_px, 2);
     EXPECT_EQ(film->pixels.size(), 16u);

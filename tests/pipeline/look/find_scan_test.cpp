@@ -126,6 +126,8 @@ TEST(FindScan, ALinearScanIsARectangleWithOrWithoutSurroundings) {
 
 TEST(FindScan, BlackPicturesAndPicturesWithoutSidesAreRefusedInOneLine) {
     const FramePile black = pile_of({frame_of(std::vector<std::uint8_t>(100 * 100, 0), 100, 100)});
+    sonocase::testing::HardCase found("of three piles without a scan, found",
+                                      sonocase::testing::HardCase::at_most, 0, "");
     const auto none = find_scan(black, burnt_in(black));
     ASSERT_FALSE(none);
     EXPECT_NE(none.error().message().find("black"), std::string::npos);
@@ -142,6 +144,7 @@ TEST(FindScan, BlackPicturesAndPicturesWithoutSidesAreRefusedInOneLine) {
     const FramePile round = pile_of({frame_of(disc, 200, 200)});
     const auto scan = find_scan(round, burnt_in(round));
     ASSERT_FALSE(scan);
+    found.see(none.has_value() + bright.has_value() + scan.has_value());
     EXPECT_NE(scan.error().message().find("--geometry"), std::string::npos);
 }
 

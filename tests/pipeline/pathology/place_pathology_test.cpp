@@ -233,7 +233,20 @@ TEST(Pathology, RefusesWhatCannotBe) {
               std::string::npos);
     PathologyRequest tight = lesion("hcc", 60);
     tight.capsule_mm = 25;
-    EXPECT_NE(refusal(phantom, {tight}).find("the largest that fits"), std::string::npos);
+    const std::string said = refusal(phantom, {tight});
+    const std::string words = "the largest that fits has ";
+    ASSERT_NE(said.find(words), std::string::npos) << said;
+    // It fits, and one a little larger does not.
+    HardCase largest("largest lesion that fits, over the one that is said to", HardCase::at_most,
+                     1.1, "");
+    const double said_ml = std::atof(said.c_str() + said.find(words) + words.size());
+    double fits = 0;
+    for (const double share : {0.99, 1.05, 1.1, 1.2, 1.5}) {
+        tight.volume_ml = share * said_ml;
+        if (phantom.place({tight})) fits = share;
+    }
+    EXPECT_GT(fits, 0) << said;
+    largest.see(fits);
     PathologyRequest air = lesion("gallstone", 1);
     air.host = {"lung"};
     EXPECT_NE(refusal(phantom, {air}).find("is air"), std::string::npos);

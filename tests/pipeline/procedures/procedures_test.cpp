@@ -533,6 +533,12 @@ TEST(Procedures, AVeinThatIsPressedShutGivesNoBlood) {
     const Vector3 way{-0.2971, -0.6417, -0.7071};
     held.at(vein, way, "aspirate=1", 0.05);
     EXPECT_EQ(held.drawn(), "nothing");
+    HardCase shut("lumen left of a vein up to which it gives nothing", HardCase::at_most, 0.1, "");
+    for (int percent = 1; percent < 50; ++percent) {
+        held.at(vein, way, "aspirate=1", 0.01 * percent);
+        if (held.drawn() != "nothing") break;
+        shut.see(0.01 * percent);
+    }
     held.at(vein, way, "aspirate=1", 0.5);
     EXPECT_EQ(held.drawn(), "blood");
     held.at(vein, way, "aspirate=1");  // nothing is known of its closing

@@ -8,6 +8,7 @@
 #include <cstdlib>
 
 #include "pipeline/segmentation/resample_labels.h"
+#include "support/hard_case.h"
 #include "support/paths.h"
 #include "support/temporary_folder.h"
 
@@ -98,6 +99,12 @@ TEST(Recipe, MechanicsStartFromTheTissueAndAreAbsentWhereNothingIsSaid) {
 }
 
 TEST(Recipe, EveryFaultNamesFileLineKeyAndWhatWouldDo) {
+    testing::HardCase least("softest tissue that a recipe may name", testing::HardCase::at_least,
+                            0.05, "kPa");
+    for (double kpa = 1; kpa > 1e-3; kpa *= 0.999)
+        if (parse(
+                with("[tissues.liver2]\nlike = \"liver\"\nstiffness_kpa = " + std::to_string(kpa))))
+            least.see(kpa);
     struct Case {
         const char* line;
         const char* what;

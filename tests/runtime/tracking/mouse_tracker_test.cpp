@@ -26,6 +26,16 @@ TEST_F(MouseOnCylinder, StartsOnTheSkinLookingIn) {
     EXPECT_TRUE(mouse_.in_contact());
 }
 
+// The plane in which an exercise begins is the exercise's: across the cylinder, or along it.
+TEST_F(MouseOnCylinder, StartsInThePlaneOfTheExercise) {
+    for (const Vector3 lateral : {Vector3{1, 0, 0}, Vector3{0, 1, 0}, Vector3{0, -1, 0.5}}) {
+        exercise_.start_lateral = lateral;
+        const MouseTracker mouse(skin_, exercise_);
+        const Vector3 x = mouse.mannequin_from_probe().rotation.column(0);
+        EXPECT_GT(dot(x, normalized({lateral.x, lateral.y, 0})), 0.98) << lateral.y;
+    }
+}
+
 TEST_F(MouseOnCylinder, KeepsContactNormalAndRadiusAllTheWayRound) {
     for (int i = 0; i < 200; ++i) {
         mouse_.slide(2, 0);

@@ -10,6 +10,7 @@
 #include <cstring>
 
 #include "runtime/tracking/devices/pose_server.h"
+#include "support/hard_case.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -51,6 +52,11 @@ TEST(WebSocket, WaitsForTheWholeRequestAndNotForEver) {
     const auto flood = websocket::answer_of("GET /" + std::string(9000, 'a'), "abc");
     ASSERT_TRUE(flood);
     EXPECT_FALSE(flood->accepted);
+    std::string endless = "GET /";
+    while (!websocket::answer_of(endless, "abc")) endless += 'a';
+    sonocase::testing::HardCase waited("bytes of a request without end that are waited for",
+                                       sonocase::testing::HardCase::at_most, 8193, "");
+    waited.see(static_cast<double>(endless.size() - 1));
 }
 
 TEST(WebSocket, RefusesWithoutTheTokenAndWhatIsNoWebSocket) {

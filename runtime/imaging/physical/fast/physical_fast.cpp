@@ -280,9 +280,17 @@ void PhysicalFast::find_contact(const PhysicalFrame& f) {
     });
     met_.beams_in_contact = smooth_gaps(geometry_, raw_gaps_, gaps_);
     if (f.press != nullptr) press_gaps(*f.press, geometry_, gaps_);
+    contact_found_ = f.effects.contact;
     if (!f.effects.contact) std::fill(gaps_.begin(), gaps_.end(), 0.0f);
     met_.gap =
         std::any_of(gaps_.begin(), gaps_.begin() + lines, [](float gap) { return gap != 0.0f; });
+}
+
+void PhysicalFast::describe(RenderedFrame& rendered) const {
+    if (presses_) rendered.press_view = &press_;
+    if (!contact_found_) return;
+    rendered.gaps_mm = std::span(gaps_).first(static_cast<std::size_t>(geometry_.scanlines));
+    rendered.touching = met_.beams_in_contact;
 }
 
 void PhysicalFast::place_beams(const PhysicalFrame& f, int first) {
@@ -577,7 +585,8 @@ double PhysicalFast::sample_beams(const PhysicalFrame& f,
     }
     choose_targets(f, keep_all);
     choose_acoustics(f);
-    if (f.press != nullptr) press_.show(context_.simd, *f.press);
+    presses_ = f.press != nullptr;
+    if (presses_) press_.show(context_.simd, *f.press);
     slice_ = speckle_slice(f.volume_from_probe.rotation * Vector3{0, 1, 0}, tables_.cell_mm);
     const PhysicalBlock base = block_of_frame(f, keep_all);
     const bool breathes = f.effects.breathing && f.motion.breathes() && !breathing.empty();

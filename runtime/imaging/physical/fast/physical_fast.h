@@ -48,6 +48,7 @@ class PhysicalFast {
     // Times of the last frame, and what it met.
     const PassTimes& pass_ms() const { return pass_ms_; }
     const PhysicalMet& met() const { return met_; }
+    void describe(RenderedFrame& rendered) const;
     // The last frame in beam space: the envelope's power in a row of samples (# scanlines), and the
     // grey of a sample.
     const float* power_row(int sample) const;
@@ -101,6 +102,7 @@ class PhysicalFast {
     const PhysicalNoise& noise_;
     const RenderContext context_;
     press::PressView press_;
+    bool presses_ = false, contact_found_ = false;  // in the last frame
     ScanConversionTable conversion_;
     int lines_ = 0, stride_ = 0, pair_stride_ = 0, cells_k_ = 0, cells_l_ = 0;
 

@@ -32,6 +32,15 @@ int label_at(const CaseBundle& bundle, Point3 p) {
     return bundle.label_bricks.at(i, j, k);
 }
 
+// The target or finding that lies at a place of the volume, if any.
+const TargetBall* ball_at(const PhysicalScene& scene, Point3 voxel) {
+    for (auto ball = scene.targets.rbegin(); ball != scene.targets.rend(); ++ball) {
+        const Vector3 f = scene.voxel_mm * (voxel - ball->centre_vx);
+        if (dot(f, ball->shape * f) <= ball->radius_mm * ball->radius_mm) return &*ball;
+    }
+    return nullptr;
+}
+
 // The pose on the skin nearest to a place; nothing if its beam does not enter the body.
 std::optional<Rigid> pose_on_skin(const CaseBundle& bundle,
                                   Point3 at,
@@ -53,18 +62,22 @@ std::optional<Rigid> pose_on_skin(const CaseBundle& bundle,
 }
 
 // Where the exercise looks: the middle of its script with a needle; or places all along its first
-// script, since one of them may show nothing but gas; or its start.
+// script, since one of them may show nothing but gas; and, half as often, where it starts, whose
+// picture is the first that anyone sees. Beams take the places in turn.
 std::vector<Rigid> opening_poses(const CaseBundle& bundle, const Exercise& exercise) {
     std::vector<Rigid> poses;
     const auto add = [&](Point3 at, Vector3 beam, Vector3 lateral) {
         if (const auto pose = pose_on_skin(bundle, at, beam, lateral)) poses.push_back(*pose);
+    };
+    const auto add_start = [&] {
+        add(exercise.start_probe, exercise.start_beam, exercise.start_lateral);
     };
     const auto needle = std::find_if(exercise.sweeps.begin(), exercise.sweeps.end(),
                                      [](const Sweep& s) { return s.name == "needle"; });
     const bool looks_around = needle == exercise.sweeps.end();
     if (exercise.sweeps.empty() ||
         (looks_around ? exercise.sweeps.front() : *needle).keys.empty()) {
-        add(exercise.start_probe, exercise.start_beam, {1, 0, 0});
+        add_start();
         return poses;
     }
     const auto& keys = (looks_around ? exercise.sweeps.front() : *needle).keys;
@@ -72,6 +85,8 @@ std::vector<Rigid> opening_poses(const CaseBundle& bundle, const Exercise& exerc
     for (std::size_t n = 0; n < places; ++n) {
         const SweepKey& key = keys[(2 * n + 1) * keys.size() / (2 * places)];
         add(key.probe, key.beam, key.lateral);
+        add(key.probe, key.beam, key.lateral);
+        add_start();
     }
     return poses;
 }
@@ -115,6 +130,12 @@ OpeningGain opening_gain(const PhysicalScene& scene,
             const int label = label_at(bundle, p);
             if (label == kBeyond) break;
             const AcousticProperties& a = scene.acoustics[static_cast<std::size_t>(label)];
+            if (const TargetBall* ball = ball_at(scene, bundle.grid.voxel_from_point(p))) {
+                lost_db += 0.2 *
+                           scene.acoustics[static_cast<std::size_t>(ball->acoustics)].attenuation *
+                           tables.frequency_mhz * kStepMm;
+                continue;  // its echo is its kind's
+            }
             if (a.kind == TissueKind::outside) {
                 if (!entered && r < kMaxGapMm) continue;  // skin and face come together
                 break;

@@ -4,13 +4,13 @@
 // would open the exercise. A thick wall takes 10 dB more from a picture than a thin one, and no
 // fixed gain shows both.
 //
-// It is worked out once, from labels alone: along some beams at the exercise's own place (the
-// middle key of its script `needle`, or else five keys all along its first script, or else its
-// start), each tissue's echo less the attenuation above it gives a level for each depth. Depth gain
-// brings levels kEvened of the way to one, like the eight sliders of a console, and gain brings
-// their mean to kOpeningGrey. Bone, gas, fluid and what lies in their shadow do not count. So it is
-// the same on every machine, for both renderers and for every attempt, whatever its pictures show
-// later.
+// It is worked out once, from labels and targets alone: along some beams, two of three at the
+// exercise's own place (the middle key of its script `needle`, or else five keys all along its
+// first script) and one of three at its start, each tissue's echo less the attenuation above it
+// gives a level for each depth. Depth gain brings levels kEvened of the way to one, like the eight
+// sliders of a console, and gain brings their mean to kOpeningGrey. Bone, gas, fluid, targets and
+// what lies in their shadow do not count. So it is the same on every machine, for both renderers
+// and for every attempt, whatever its pictures show later.
 #pragma once
 
 #include <array>

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/import/mesh/mesh_shapes.h"
+#include "support/hard_case.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -77,11 +78,14 @@ TEST(GlbFile, ReadsStripsAndFansAndLeavesLinesAside) {
 
 TEST(GlbFile, EveryTruncationIsRefusedInOneLine) {
     const auto whole = glb_of({{"a", ball_mesh({0, 0, 0}, 1, 6), ""}});
+    int read = 0;
     for (std::size_t n = 0; n < whole.size(); n += 7) {
         const auto nodes = read_glb(std::span(whole).first(n), "x.glb");
-        ASSERT_FALSE(nodes) << n;
-        EXPECT_EQ(nodes.error().message().find('\n'), std::string::npos);
+        read += nodes.has_value();
+        if (!nodes) EXPECT_EQ(nodes.error().message().find('\n'), std::string::npos);
     }
+    testing::HardCase cut("of files cut off anywhere, read", testing::HardCase::at_most, 0, "");
+    cut.see(read);
 }
 
 TEST(GlbFile, RefusesWhatItCannotRead) {

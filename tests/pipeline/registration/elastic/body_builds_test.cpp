@@ -66,6 +66,13 @@ TEST_P(BodyBuilds, AreReachedAndOrgansKept) {
     ASSERT_TRUE(result) << result.error().message();
     EXPECT_LE(result->fit.median_mm, 0.75);
     EXPECT_LE(result->fit.p95_mm, 2.7);
+    std::optional<HardCase> off, kept;  // figures of one of the fifteen bodies
+    if (build == Build::belly && seed == 1) {
+        off.emplace("readings of a body with a belly to its skin, 95 %", HardCase::at_most, 2.7,
+                    "mm");
+        kept.emplace("volume of its organs, off", HardCase::at_most, 0.08, "");
+        off->see(result->fit.p95_mm);
+    }
     EXPECT_GE(result->fit.coverage, 0.6);
     EXPECT_GE(measure(*result, "min_det_jacobian"), 0.2);
     EXPECT_GT(measure(*result, "least_minor"), 0);
@@ -73,6 +80,7 @@ TEST_P(BodyBuilds, AreReachedAndOrgansKept) {
     for (const OrganChange& c : result->organs) {
         if (c.label != "liver" && c.label != "spleen" && !c.label.starts_with("kidney_")) continue;
         EXPECT_NEAR(c.volume_ratio, 1, 0.08) << c.label;
+        if (kept) kept->see(std::abs(c.volume_ratio - 1));
         if (c.label == "liver") {
             EXPECT_LE(c.shape_change, 0.2);
         }

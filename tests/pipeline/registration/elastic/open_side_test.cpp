@@ -260,6 +260,17 @@ TEST(HeadDirection, DISABLED_OfFiftyMannequinsReadAllRound) {
     EXPECT_EQ(alarms, 0);
 }
 
+// Nothing that was given says where the head is, and a front alone does not.
+TEST(HeadDirection, OfAFrontWithoutAHintIsSaidNotToBeTold) {
+    BuildSweep plan;
+    plan.least_front = -0.3;
+    const BuiltMannequin open = built_mannequin(Build::belly, 1, plan);
+    const auto aligned = align_surfaces({torso_patient().skin, open.sweep}, RegisterOptions{});
+    ASSERT_TRUE(aligned) << aligned.error().message();
+    EXPECT_TRUE(note(*aligned, "head").starts_with("not told")) << note(*aligned, "head");
+    EXPECT_NE(note(*aligned, "head").find("--up"), std::string::npos);
+}
+
 // A mannequin 30 mm wider than the patient, read all round: its skins lie farther apart than a
 // missing counterpart costs, so that every pose beyond its ends scores better than the right one.
 // The share is that of the rigid pose, before any warp; of a pose off the body it is 0.

@@ -119,6 +119,7 @@ TEST(TablePlane, OfReadingsOfTheTableOnlyNothingIsFitted) {
     for (int n = 0; n < 400; ++n)
         table.points.push_back(
             {random.uniform(-300, 300), random.uniform(-500, 500), 0.7 * random.gaussian()});
+    HardCase fitted("of two clouds of the table, fitted", HardCase::at_most, 0, "");
     const auto refused = register_surfaces({torso_patient().skin, table});
     ASSERT_FALSE(refused);
     EXPECT_NE(refused.error().message().find("in a plane"), std::string::npos)
@@ -127,7 +128,7 @@ TEST(TablePlane, OfReadingsOfTheTableOnlyNothingIsFitted) {
     for (int n = 0; n < 20; ++n)
         table.points.push_back(
             {random.uniform(-100, 100), random.uniform(-100, 100), random.uniform(50, 150)});
-    EXPECT_FALSE(register_surfaces({torso_patient().skin, table}));
+    fitted.see(refused.has_value() + register_surfaces({torso_patient().skin, table}).has_value());
 }
 
 // 95th percentile of the distance from the true surface that nobody read to the mapped skin.

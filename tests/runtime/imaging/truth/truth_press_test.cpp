@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "../pressed_block.h"
+#include "runtime/imaging/core/image_formation.h"
 #include "runtime/imaging/core/needle_shift.h"
 #include "support/hard_case.h"
 #include "truth_support.h"
@@ -147,6 +148,63 @@ TEST(TruthPressed, TargetsAndTheTipAreWhereTissueIsNow) {
     EXPECT_NEAR(distance(facts.targets[0].centre, now), 0, 1e-9);
     EXPECT_NEAR(facts.targets[0].tip_mm, 0, 1e-9);
     EXPECT_EQ(facts.tip_label, PressedBlock::vein_label);
+}
+
+// The renderer has pressed the probe and found the beams' contact: its truth takes that over, with
+// the bytes of a truth that finds all by itself. What the renderer did last must be that frame.
+TEST(TruthPressed, WhatTheRendererHasFoundIsTakenOverWithTheSameBytes) {
+    for (const ImageModel model : {ImageModel::physical, ImageModel::paper})
+        for (const Exercise& exercise : block_exercises()) {
+            RenderOptions options = picture(180, 170);
+            options.model = model;
+            auto renderer = Renderer::create(pressed_block(), exercise, options);
+            ASSERT_TRUE(renderer);
+            auto alone = truth_of(pressed_block(), exercise, options),
+                 beside = truth_of(pressed_block(), exercise, options);
+            std::vector<std::uint8_t> pixels(180 * 170);
+            const auto compare = [&](const FrameInput& input, bool found) {
+                EXPECT_EQ(renderer->rendered(input).has_value(), found);
+                Planes a(options), b(options);
+                const FrameTruth facts = alone.render(input, a.spans());
+                const FrameTruth& same = beside.render(input, b.spans(), &*renderer);
+                EXPECT_TRUE(a == b);
+                EXPECT_TRUE(facts.mannequin_from_probe == same.mannequin_from_probe);
+                EXPECT_EQ(facts.press.force_n, same.press.force_n);
+                EXPECT_EQ(facts.beams_touching, same.beams_touching);
+                EXPECT_EQ(facts.tip_label, same.tip_label);
+            };
+            EXPECT_FALSE(renderer->rendered(pressed_input(9)));  // before the first frame
+            for (const FrameInput& input :
+                 {pressed_input(-3), pressed_input(9), pressed_input(9, 2.5), pressed_input(14)}) {
+                renderer->render(input, pixels);
+                compare(input, true);
+                // The same tissue in another picture.
+                FrameInput brighter = input;
+                brighter.settings.gain_db = 9;
+                brighter.frame = 5;
+                compare(brighter, true);
+            }
+            FrameInput input = pressed_input(9);
+            renderer->render(input, pixels);
+            for (const auto change :
+                 {+[](FrameInput& i) { i.settings.press_mm = 2; },
+                  +[](FrameInput& i) { i.change.venous_pressure_mmhg = 2; },
+                  +[](FrameInput& i) { i.change.pool_count = 1; },
+                  +[](FrameInput& i) { i.has_needle = true; },
+                  +[](FrameInput& i) { i.mannequin_from_probe.translation.x += 1; }}) {
+                FrameInput other = input;
+                change(other);
+                compare(other, false);
+            }
+            compare(input, true);
+            renderer->press_probe(pressed_input(4));  // asked for another pose since then
+            compare(input, false);
+            renderer->render(input, pixels);
+            renderer->press_mm_for(input.mannequin_from_probe, 5, 3);
+            compare(input, false);
+            renderer->leave_out(-1);
+            compare(input, false);
+        }
 }
 
 TEST(TruthPressed, EveryInstructionSetGivesTheSameBytesAndWithoutTheEffectNothingMoves) {

@@ -122,6 +122,56 @@ TEST(Truth, LabelsAreThoseOfThePhantomItself) {
     EXPECT_EQ(wrong, 0);
 }
 
+// Lifted, tilted by 50 degrees, on its side, upside down and seen from the other side.
+TEST(Truth, AnyProbeHasTheLabelsOfThePlacesThatItsPixelsShow) {
+    const Phantom body;
+    const CaseBundle& bundle = phantom();
+    const Exercise exercise = phantom_exercise();
+    const RenderOptions options = picture(160, 160, {"-contact", "-deformation"});
+    auto truth = truth_of(bundle, exercise, options);
+    auto renderer = Renderer::create(bundle, exercise, options);
+    ASSERT_TRUE(renderer);
+    const auto layout = renderer->layout();
+    HardCase other("of pixels 1 mm from surfaces, of any probe, with another label",
+                   HardCase::at_most, 0, "");
+    Planes planes(options);
+    for (const auto& [axis, angle, lift_mm, flipped] :
+         {std::tuple{Vector3{1, 0, 0}, 0.0, -6.0, false},
+          {{1, 0, 0}, 0.9, 0.0, false},
+          {{0, 0, 1}, 1.57, 0.0, false},
+          {{0, 0, 1}, 3.14, 0.0, true},
+          {{0, 1, 0}, 0.5, 2.0, true}}) {
+        FrameInput input;
+        input.mannequin_from_probe.rotation = rotation_about(axis, angle);
+        input.mannequin_from_probe.translation = {2, -3, lift_mm};
+        input.settings.flip_left_right = flipped;
+        truth.render(input, planes.spans());
+        int wrong = 0, compared = 0;
+        for (int row = 0; row < options.height_px; ++row) {
+            for (int column = 0; column < options.width_px; ++column) {
+                const double x = (column - layout.origin_x_px) * layout.mm_per_px,
+                             z = (row - layout.origin_y_px) * layout.mm_per_px;
+                if (depth_along(exercise.probe, x, z) < 0) continue;
+                const Point3 at = input.mannequin_from_probe * Point3{flipped ? -x : x, 0, z};
+                // Where the volume ends, and two surfaces within a voxel, are left out.
+                bool clear = true;
+                for (int a = 0; a < 3; ++a) {
+                    const double from = at[a] - bundle.grid.origin_mm[a],
+                                 end = (bundle.grid.size[a] - 1) * bundle.grid.spacing_mm[a];
+                    clear = clear && from > 2 && from < end - 2;
+                }
+                for (int shape = 1; shape < Phantom::count; ++shape)
+                    clear = clear && std::abs(body.distance(shape, at)) > 1.0;
+                if (!clear) continue;
+                ++compared;
+                wrong += planes.labels[planes.at(column, row)] != body.label(at);
+            }
+        }
+        EXPECT_GT(compared, 1000);
+        other.see(wrong);
+    }
+}
+
 TEST(Truth, OnePixelAsksTheSameAsAllTogether) {
     const CaseBundle& bundle = phantom();
     Exercise exercise = phantom_exercise();

@@ -38,6 +38,7 @@ TEST(NewTarget, IsReadBackAsItWasPlacedWhateverTheTitleHolds) {
         EXPECT_EQ(read->targets[0].radius_mm, 7);
         EXPECT_NEAR(distance(read->start_probe, pose * Point3{0, 0, 0}), 0, 0.01);
         EXPECT_NEAR(dot(normalized(read->start_beam), pose.rotation * Vector3{0, 0, 1}), 1, 1e-6);
+        EXPECT_NEAR(dot(start_pose(*read).rotation.column(0), pose.rotation.column(0)), 1, 1e-6);
         EXPECT_EQ(read->probe.shape, base().probe.shape);
         EXPECT_NEAR(read->probe.field_of_view_rad, base().probe.field_of_view_rad, 1e-5);
         EXPECT_GE(read->pass_marks.size(), 3u);
