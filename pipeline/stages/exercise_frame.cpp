@@ -43,6 +43,10 @@ void set_triple(toml::table& table, std::string_view key, Vector3 v, double step
     table.insert_or_assign(key, std::move(list));
 }
 
+// Probe x where none is given: to the patient's left, so that the picture shows the patient's right
+// at its left.
+constexpr Vector3 kAcrossPatient{-1, 0, 0};
+
 class Mapper {
   public:
     explicit Mapper(const Registration& registration) : registration_(registration) {}
@@ -68,7 +72,7 @@ class Mapper {
         const Vector3 mapped = normalized(point(*position + look_mm * beam) - point(*position));
         set_triple(table, beam_key, mapped, 1e-6);
         const Vector3 lateral =
-            normalized(triple_in(table, lateral_key).value_or(Vector3{1, 0, 0}));
+            normalized(triple_in(table, lateral_key).value_or(kAcrossPatient));
         set_triple(table, lateral_key, across(*position, lateral, mapped), 1e-6);
     }
 

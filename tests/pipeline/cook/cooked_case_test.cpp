@@ -121,15 +121,15 @@ TEST(ExerciseFrame, TheFirstPlaneIsThatOfAKeyAtTheSamePlace) {
     const Rigid start = start_pose(*exercise);
     EXPECT_LT(norm(start.rotation.column(2) - key.beam), 1e-4);
     EXPECT_LT(norm(start.rotation.column(0) - key.lateral), 1e-4);
-    // Where none is given, it lies across the patient.
+    // Where none is given, it lies across the patient, whose right is at the picture's left.
     const auto plain = exercise_to_mannequin("name = \"a\"\nstart_" + place + "start_" + towards,
                                              "a.toml", analytic_torso_truth());
     ASSERT_TRUE(plain) << plain.error().message();
     const auto of_patient = parse_exercise(*plain, "a.toml");
     ASSERT_TRUE(of_patient) << of_patient.error().message();
     const Point3 skin = mannequin_from_ct(analytic_torso_truth(), {80, 130, 70});
-    const Vector3 right = mannequin_from_ct(analytic_torso_truth(), {81, 130, 70}) - skin;
-    EXPECT_GT(dot(start_pose(*of_patient).rotation.column(0), normalized(right)), 0.98);
+    const Vector3 left = mannequin_from_ct(analytic_torso_truth(), {79, 130, 70}) - skin;
+    EXPECT_GT(dot(start_pose(*of_patient).rotation.column(0), normalized(left)), 0.98);
     // A beam along that direction has another.
     const auto along_x =
         exercise_to_mannequin("name = \"a\"\nstart_" + place + "start_beam = [-1, 0, 0]\n",
