@@ -175,7 +175,7 @@ struct Exercise {
     Point3 start_probe;              // where the mouse tracker begins
     Vector3 start_beam{0, 0, -1};
     Vector3 start_lateral{1, 0, 0};  // probe x, made orthogonal to start_beam
-    double start_spread_mm = 0;  // an attempt begins half to all of this away from start_probe
+    double start_spread_mm = 0;      // an attempt begins half to all of this away from start_probe
     std::vector<Sweep> sweeps;
     BreathingMotion breathing;
     Pulsation pulsation;

@@ -128,8 +128,8 @@ FollowerPicture MarkerFollower::follow(std::span<const SeenTag> seen,
         const std::optional<BodyPose> pose =
             find(role, seen, twice, recent ? &track.camera_from_body : nullptr);
         reading.world_from_body = track.world_from_body;
-        // A finger or a blurred picture does not last. What lies on no body is not followed, so that
-        // it has a pose in some pictures alone.
+        // A finger or a blurred picture does not last. What lies on no body is not followed, so
+        // that it has a pose in some pictures alone.
         constexpr int kMisfits = 8, kManyTags = 3;
         constexpr double kMisfitS = 0.5;
         if (pose) {

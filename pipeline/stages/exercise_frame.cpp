@@ -71,8 +71,7 @@ class Mapper {
         if (!position) return;
         const Vector3 mapped = normalized(point(*position + look_mm * beam) - point(*position));
         set_triple(table, beam_key, mapped, 1e-6);
-        const Vector3 lateral =
-            normalized(triple_in(table, lateral_key).value_or(kAcrossPatient));
+        const Vector3 lateral = normalized(triple_in(table, lateral_key).value_or(kAcrossPatient));
         set_triple(table, lateral_key, across(*position, lateral, mapped), 1e-6);
     }
 

@@ -214,8 +214,8 @@ double more_mb(const CaseSize& size, bool least) {
     constexpr double kHeld = 250, kMeasured = 415;  // for a million faces
     // Share of the faces that lie in two parts of boxes.
     constexpr double kWhole = 11.5, kInParts = 0.4;
-    // Organ meshes take, for a million faces: what is held, and the most while it is measured, whole
-    // and in parts.
+    // Organ meshes take, for a million faces: what is held, and the most while it is measured,
+    // whole and in parts.
     constexpr double kMeshHeld = 300, kMeshMeasured = 590, kMeshInParts = 350;
     // Of thick slices, for a node of the box of the body: numbers of every node, not of those near
     // a surface alone.

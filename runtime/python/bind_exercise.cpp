@@ -226,10 +226,7 @@ void bind_exercise(py::module_& module) {
         .def_readonly("targets", &Exercise::targets)
         .def_readonly("no_go", &Exercise::no_go, "Labels that the needle must not touch.")
         .def_property_readonly(
-            "start_pose",
-            [](const CaseExercise& e) {
-                return array_of(start_pose(e));
-            },
+            "start_pose", [](const CaseExercise& e) { return array_of(start_pose(e)); },
             "mannequin_from_probe where the exercise begins, before the probe is set down on the "
             "skin; shape (4, 4), mm.")
         .def_property_readonly(

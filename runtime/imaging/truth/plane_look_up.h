@@ -62,8 +62,8 @@ class PlaneLookUp {
                 int rays);
 
     // Begins a frame: finds where the beams touch and how the tissue has moved. press: the field of
-    // the picture; null: nothing is pressed. The pose is where bone holds the face. rendered: what a
-    // renderer of the same geometry found for it; its gaps are not looked for again.
+    // the picture; null: nothing is pressed. The pose is where bone holds the face. rendered: what
+    // a renderer of the same geometry found for it; its gaps are not looked for again.
     void begin(const Rigid& mannequin_from_probe,
                double time_s,
                bool wants_entry,

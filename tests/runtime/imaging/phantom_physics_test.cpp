@@ -347,8 +347,8 @@ double brighter_behind_rod(const CaseBundle& with,
 
 TEST(PhantomPhysics, EnhancementBehindFluidIsWhatItsPathSpares) {
     const double mhz = phantom_exercise().probe.frequency_mhz;
-    // Attenuation of urine, bile, cysts (0.01) and blood (0.15) as in the table of tissues, and what
-    // the pulse loses in fluid besides since it steepens (physical_model.h).
+    // Attenuation of urine, bile, cysts (0.01) and blood (0.15) as in the table of tissues, and
+    // what the pulse loses in fluid besides since it steepens (physical_model.h).
     struct Fluid {
         const char* name;
         std::uint8_t label;

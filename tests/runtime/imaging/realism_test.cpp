@@ -107,7 +107,8 @@ double patch_99th(const BeamImage& image, PatchPlace place) {
 TEST(Realism, DetailHasALivingLiversContrastWhereGainIsTurnedToItsGrey) {
     // Medians of 303 patches of the living sweep's liver, 33 to 91 mm deep, by the same functions.
     constexpr double kMean = 34.1, kLocalSd = 8.03, k99th = 65.4;
-    // Gain is a knob before the grey map: an offset or a factor of finished grey is another picture.
+    // Gain is a knob before the grey map: an offset or a factor of finished grey is another
+    // picture.
     View view(liver(), sweep_exercise(), "modern");
     double low_db = -15, high_db = 0;
     PatchScores t;

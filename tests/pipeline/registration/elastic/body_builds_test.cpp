@@ -333,7 +333,8 @@ TEST_P(AnySeed, GivesTheSameMap) {
         given ? std::vector{102, 111, 120, 130, 140, 150, 171, 192} : std::vector{102};
     for (const int starts : all_starts) {
         const double off = apart_mm(patient->labels, fit(1, starts), first);
-        // Other starts may come to rest elsewhere in the same basin: 0.41 mm apart on the shared pair.
+        // Other starts may come to rest elsewhere in the same basin: 0.41 mm apart on the shared
+        // pair.
         EXPECT_LE(off, 0.5) << starts << " starts";
         if (given) std::printf("%s, %d starts: %.3f mm\n", which.c_str(), starts, off);
     }
