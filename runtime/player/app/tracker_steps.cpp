@@ -160,7 +160,7 @@ void check_device(TrackerInUse& tracker,
     if (!health.message.empty() && tracker.reported.insert(health.message).second)
         std::fprintf(stderr, "sonoplay: %s\n", health.message.c_str());
     if (health.phase != TrackerPhase::streaming || health.device == tracker.compared_device) return;
-    tracker.compared_device = health.device;
+    tracker.compared_device.assign(health.device);
     for (const Message& warning :
          sensor_mismatch_warnings(loaded.set_up.calibrations, health.device))
         notices.warning(warning);
