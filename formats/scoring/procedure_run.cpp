@@ -905,14 +905,20 @@ ProcedureView ProcedureRun::view() const {
     for (std::size_t s = 0; s < p.steps.size(); ++s)
         view.steps[s] = static_cast<int>(s) == view.present_step ? StepState::present
                                                                  : step_state(static_cast<int>(s));
-    for (std::size_t i = 0; i < p.items.size() && view.question < 0; ++i) {
-        const ProcedureItem& item = p.items[i];
-        const bool asked =
-            item.from_step < 0 || state_.steps[static_cast<std::size_t>(item.from_step)].performed;
-        if (item.rule == ItemRule::asked && asked && !state_.items[i].held)
-            view.question = static_cast<int>(i);
-    }
+    view.question = next_question(p, state_);
     return view;
+}
+
+int next_question(const Procedure& procedure, const ProcedureState& state, int after) {
+    const int count = static_cast<int>(procedure.items.size());
+    for (int i = after + 1; i < count; ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        const ProcedureItem& item = procedure.items[at];
+        const bool asked =
+            item.from_step < 0 || state.steps[static_cast<std::size_t>(item.from_step)].performed;
+        if (item.rule == ItemRule::asked && asked && !state.items[at].held) return i;
+    }
+    return -1;
 }
 
 double ProcedureRun::free_fluid_ml() const {

@@ -125,9 +125,12 @@ struct ProcedureState {
 struct ProcedureView {
     int present_step = -1;  // ProcedureRun::present_step()
     std::array<StepState, kMaxSteps> steps{};
-    int question = -1;  // the first item that is asked now and has no answer; -1: none
+    int question = -1;  // next_question()
     ProcedureState state;
 };
+
+// The first item behind `after` that is asked now and has no answer; -1: none.
+int next_question(const Procedure& procedure, const ProcedureState& state, int after = -1);
 
 // procedure_tray() without what is done already: no second hand presses, no drain lies twice.
 std::vector<TrayAct> tray_now(const Procedure& procedure, const ProcedureState& state);

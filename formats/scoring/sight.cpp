@@ -238,7 +238,7 @@ Light light_on(const Anatomy& anatomy,
         if (at.bone || at.gas) light.hidden_mm = line.length_mm - depth_mm;
         light.echo = at.echo;
         loss_db += per_step * at.loss_db_cm_mhz;
-        return true;
+        return loss_db < kDeadDb;  // a dead line stays dead, and nothing shows on it
     };
     if (!walk(anatomy, probe, line, mannequin_from_probe, time_s, meet)) return {};
     light.lit = lit(line.length_mm);

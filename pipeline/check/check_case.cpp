@@ -147,6 +147,7 @@ class Anatomy {
         const Vector3 right = cross(forwards, up);
         result_.forwards = forwards;
         result_.up = up;
+        constexpr int kNamedPairs = 4;
         int agree = 0, against = 0;
         std::string swapped;
         const auto compare = [&](std::optional<Vector3> r, std::optional<Vector3> l,
@@ -155,8 +156,7 @@ class Anatomy {
             const double off = dot(*r - *l, right) * labels_.voxel_mm();
             if (off > 10) ++agree;
             if (off < -10) {
-                ++against;
-                swapped += (swapped.empty() ? "" : ", ") + name;
+                if (++against <= kNamedPairs) swapped += (swapped.empty() ? "" : ", ") + name;
             }
         };
         compare(middle({"liver"}), middle({"spleen"}), "liver and spleen");
@@ -170,10 +170,12 @@ class Anatomy {
             compare(sums_.middle[r], sums_.middle[l], label.name);
         }
         if (against > 0)
-            result_.faults.push_back({"sides-swapped",
-                                      "right and left are exchanged: " + swapped +
-                                          (agree > 0 ? " (others are right)" : ""),
-                                      "check the label map's axes and the names of its values"});
+            result_.faults.push_back(
+                {"sides-swapped",
+                 "right and left are exchanged: " + swapped +
+                     (against > kNamedPairs ? text(" and %d more", against - kNamedPairs) : "") +
+                     (agree > 0 ? " (others are right)" : ""),
+                 "check the label map's axes and the names of its values"});
     }
 
     void units() {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <utility>
 
@@ -173,7 +174,8 @@ std::string views(const CaseBundle& bundle, const CheckResult& result) {
 
 // A plane through the middle of the volume at right angles to `axis`, labels in their colours.
 using Colours = std::vector<std::array<std::uint8_t, 3>>;  // # labels
-std::string plane(const CaseBundle& bundle, int axis, const Colours& colours) {
+enum class Borders { plain, drawn };                       // a dark line between structures
+std::string plane(const CaseBundle& bundle, int axis, const Colours& colours, Borders borders) {
     const Int3 size = bundle.grid.size;
     const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
     const int width = size[u], height = size[v];
@@ -185,14 +187,21 @@ std::string plane(const CaseBundle& bundle, int axis, const Colours& colours) {
             p[axis] = size[axis] / 2;
             p[u] = x;
             p[v] = y;
-            for (const std::uint8_t c : colours[bundle.label_bricks.at(p.x, p.y, p.z)])
-                rgb[at++] = c;
+            const auto label = [&](Int3 q) { return bundle.label_bricks.at(q.x, q.y, q.z); };
+            bool border = false;
+            for (const int along : {u, v}) {
+                Int3 next = p;
+                if (++next[along] < size[along]) border = border || label(next) != label(p);
+            }
+            const bool dark = border && borders == Borders::drawn;
+            for (const std::uint8_t c : colours[label(p)]) rgb[at++] = dark ? std::uint8_t{40} : c;
         }
     return picture("plane", png_from_rgb(rgb.data(), width, height));
 }
 
-std::string planes(const CaseBundle& bundle, const Colours& colours) {
-    return plane(bundle, 0, colours) + plane(bundle, 1, colours) + plane(bundle, 2, colours);
+std::string planes(const CaseBundle& bundle, const Colours& colours, Borders borders) {
+    return plane(bundle, 0, colours, borders) + plane(bundle, 1, colours, borders) +
+           plane(bundle, 2, colours, borders);
 }
 
 Colours own_colours(const CaseBundle& bundle) {
@@ -209,9 +218,10 @@ struct Step {
     std::array<std::uint8_t, 3> colour;
 };
 constexpr Step kSteps[] = {
-    {2, "within 2 mm", {255, 245, 200}}, {5, "2 to 5 mm", {253, 204, 110}},
-    {10, "5 to 10 mm", {244, 140, 60}},  {20, "10 to 20 mm", {205, 60, 35}},
-    {40, "20 to 40 mm", {150, 25, 45}},  {1e9, "more than 40 mm", {80, 0, 45}}};
+    {2, "within 2 mm", {255, 250, 220}}, {5, "2 to 5 mm", {254, 227, 150}},
+    {10, "5 to 10 mm", {253, 190, 90}},  {20, "10 to 20 mm", {243, 140, 60}},
+    {40, "20 to 40 mm", {222, 85, 60}},  {60, "40 to 60 mm", {190, 45, 95}},
+    {80, "60 to 80 mm", {140, 40, 130}}, {1e9, "more than 80 mm", {85, 45, 130}}};
 
 const Step& step_of(double mm) {
     return *std::find_if(std::begin(kSteps), std::end(kSteps),
@@ -223,7 +233,7 @@ std::string unknown_part(const CaseBundle& bundle) {
     const std::vector<UnknownPlace> places = unknown_places(bundle.manifest.stages);
     if (places.empty()) return "";
     Colours colours(bundle.labels.size(), {150, 150, 150});  // a structure of later stages
-    colours[0] = {0, 0, 0};
+    colours[0] = {255, 255, 255};
     std::string rows, legend;
     for (const UnknownPlace& place : places) {
         for (std::size_t l = 1; l < bundle.labels.size(); ++l)
@@ -239,9 +249,11 @@ std::string unknown_part(const CaseBundle& bundle) {
             "step", {{"rgb", std::to_string(step.colour[0]) + "," + std::to_string(step.colour[1]) +
                                  "," + std::to_string(step.colour[2])},
                      {"words", step.words}});
-    return html().filled("unknown", {{"planes", planes(bundle, colours)},
+    std::string advice = landmark_advice(places);
+    if (!advice.empty()) advice[0] = static_cast<char>(std::toupper(advice[0]));
+    return html().filled("unknown", {{"planes", planes(bundle, colours, Borders::drawn)},
                                      {"legend", legend},
-                                     {"advice", escaped_html(landmark_advice(places))},
+                                     {"advice", escaped_html(advice)},
                                      {"rows", rows}});
 }
 
@@ -321,7 +333,7 @@ std::string check_page(const CaseBundle& bundle,
         "page",
         {{"case", escaped_html(bundle.manifest.case_name)},
          {"faults", faults_part(result)},
-         {"planes", planes(bundle, own_colours(bundle))},
+         {"planes", planes(bundle, own_colours(bundle), Borders::plain)},
          {"accuracy", accuracy_part(bundle, points)},
          {"unknown", unknown_part(bundle)},
          {"views", views(bundle, result)},

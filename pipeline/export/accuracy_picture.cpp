@@ -3,6 +3,7 @@
 #include "pipeline/export/accuracy_picture.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "pipeline/base/text.h"
@@ -11,7 +12,9 @@
 namespace sonocase::pipeline::inline exporting {
 namespace {
 
-constexpr std::size_t kPlaces = 8;  // structures that are shown
+constexpr std::size_t kPlaces = 8;                               // structures that are shown
+constexpr std::array<std::uint8_t, 3> kBarColour{86, 180, 233},  // pale: marks lie on it
+    kPresentColour{213, 94, 0}, kLandmarksColour{0, 158, 115};
 
 std::string bar(double mm, double longest_mm) {
     constexpr double kWidth = 32;
@@ -23,35 +26,30 @@ std::string bar(double mm, double longest_mm) {
 
 ChartSheet sheet_of(const CaseAccuracy& accuracy) {
     ChartSheet sheet;
-    sheet.columns = 3;
-    sheet.width_px = 560;
+    sheet.width_px = 350;
     sheet.height_px = 420;
     Chart parts;
     parts.title = "Where the millimetres come from";
     parts.y_label = "mean displacement of surfaces, mm";
-    parts.x_of_things = true;
-    double at = 0;
+    parts.rows = true;
     for (const BudgetEntry& e : accuracy.budget.entries) {
-        at += 1;
         if (!std::isfinite(e.mm)) continue;
-        parts.series.push_back({text("%s: %s, %.2f", e.stage.c_str(), e.cause.c_str(), e.mm),
-                                {at},
+        parts.series.push_back({text("%s: %s", e.stage.c_str(), e.cause.c_str()),
+                                {0},
                                 {e.mm},
-                                SeriesStyle::bars});
+                                SeriesStyle::bars,
+                                kBarColour});
     }
     sheet.charts.push_back(std::move(parts));
     if (!accuracy.places.empty()) {
         Chart places;
         places.title = "Known least: nine times in ten within";
-        places.y_label = "mm";
-        places.x_of_things = true;
+        places.y_label = "mm from its place";
+        places.rows = true;
         Series held{"with two landmarks", {}, {}, SeriesStyle::diamonds, {27, 31, 36}, 6};
         for (std::size_t i = 0; i < std::min(accuracy.places.size(), kPlaces); ++i) {
             const UnknownPlace& p = accuracy.places[i];
-            places.series.push_back({text("%s, %.1f", p.label.c_str(), p.p90_mm),
-                                     {static_cast<double>(i + 1)},
-                                     {p.p90_mm},
-                                     SeriesStyle::bars});
+            places.series.push_back({p.label, {0}, {p.p90_mm}, SeriesStyle::bars, kBarColour});
             if (!(p.with_landmarks_mm > 0)) continue;
             held.x.push_back(static_cast<double>(i + 1));
             held.y.push_back(p.with_landmarks_mm);
@@ -62,30 +60,21 @@ ChartSheet sheet_of(const CaseAccuracy& accuracy) {
     if (accuracy.points.size() > 1) {
         Chart curve;
         curve.title = "What seconds buy in this case";
-        curve.x_label = "seconds more than now";
         curve.y_label = "mean displacement of surfaces, mm";
-        Series all{"voxels of the case", {}, {}, SeriesStyle::line_and_points};
-        Series now{"as it is", {}, {}, SeriesStyle::diamonds, {213, 40, 0}, 6};
-        for (const CasePoint& point : accuracy.points) {
-            if (point.landmarks) continue;
-            all.x.push_back(point.more_seconds);
-            all.y.push_back(point.error_mm);
-            if (!point.present) continue;
-            now.x.push_back(point.more_seconds);
-            now.y.push_back(point.error_mm);
-        }
-        curve.series = {std::move(all), std::move(now)};
+        curve.rows = true;
         for (const CasePoint& point : accuracy.points)
-            if (point.landmarks)
-                curve.series.push_back({point.setting,
-                                        {point.more_seconds},
-                                        {point.error_mm},
-                                        SeriesStyle::crosses,
-                                        {0, 158, 115},
-                                        6});
+            curve.series.push_back(
+                {point.present ? point.setting + ", as it is"
+                               : text("%s, %+.1f s", point.setting.c_str(), point.more_seconds),
+                 {0},
+                 {point.error_mm},
+                 SeriesStyle::bars,
+                 point.present     ? kPresentColour
+                 : point.landmarks ? kLandmarksColour
+                                   : kBarColour});
         sheet.charts.push_back(std::move(curve));
     }
-    sheet.columns = static_cast<int>(sheet.charts.size());
+    sheet.columns = 3;
     return sheet;
 }
 

@@ -13,6 +13,7 @@
 #include "formats/files/atomic_file.h"
 #include "formats/files/load_save.h"
 #include "formats/files/thread_jobs.h"
+#include "pipeline/anatomy/anatomy_check.h"
 #include "pipeline/base/text.h"
 #include "pipeline/check/check_case.h"
 #include "pipeline/check/propose_exercises.h"
@@ -75,6 +76,21 @@ double covered_share(const LabelVolume& labels) {
     return faces == 0 ? 0 : static_cast<double>(covered) / static_cast<double>(faces);
 }
 
+// "'Leber', 'Milz' and 3 more": names that no structure here has. What the scan fills in counts as
+// none.
+std::string unknown_names(const std::vector<Label>& labels) {
+    constexpr int kNamed = 4;
+    std::string names;
+    int count = 0;
+    for (const Label& label : labels) {
+        if (label.tissue == "outside" || is_known_structure(label.name) || label.name == "skin" ||
+            label.name == "gas_in_body" || label.name.starts_with("other_"))
+            continue;
+        if (++count <= kNamed) names += (count == 1 ? "'" : ", '") + label.name + "'";
+    }
+    return count > kNamed ? names + text(" and %d more", count - kNamed) : names;
+}
+
 class Maker {
   public:
     Maker(const MakeOptions& options,
@@ -93,6 +109,15 @@ class Maker {
     }
 
     Result<MadeCase> run() {
+        auto made = make();
+        if (made) return made;
+        Error error = made.error();
+        error.where = folder_.given(error.where);
+        return error;
+    }
+
+  private:
+    Result<MadeCase> make() {
         SONOCASE_TRY_DONE(write_recipe());
         SONOCASE_TRY_DONE(propose_all());
         SONOCASE_TRY_DONE(cook_with_exercises());
@@ -105,7 +130,6 @@ class Maker {
         return std::move(made_);
     }
 
-  private:
     RecipeOverrides overrides() const {
         RecipeOverrides overrides;
         overrides.preset = options_.preset;
@@ -160,7 +184,7 @@ class Maker {
         const LabelVolume& labels = imported.as(kCtLabels).volume;
         if (const std::string why = why_none_fits(labels.labels);
             !why.empty() && folder_.exercises().empty())
-            return no_exercise(why);
+            return no_exercise(why, unknown_names(labels.labels));
         const double share = covered_share(labels);
         if (share >= kCovered) return Done{};
         return Error{
@@ -172,11 +196,13 @@ class Maker {
             "whole body, such as TotalSegmentator's task body"};
     }
 
-    Error no_exercise(const std::string& why) const {
-        return Error{"none of the exercises fits this anatomy: " + why, options_.inputs.front(),
-                     "expected an abdomen or pelvis with named organs; an exercise of your own may "
-                     "lie in " +
-                         folder_.path()};
+    Error no_exercise(const std::string& why, const std::string& unknown = "") const {
+        return Error{"none of the exercises fits this anatomy: " + why +
+                         (unknown.empty() ? "" : "; unknown names: " + unknown),
+                     options_.inputs.front(),
+                     "expected an abdomen or pelvis whose organs have TotalSegmentator's names" +
+                         std::string(unknown.empty() ? "" : " (--table FILE gives them)") +
+                         "; an exercise of your own may lie in " + folder_.path()};
     }
 
     Status propose_all() {

@@ -188,6 +188,16 @@ Result<std::string> CaseFolder::link(const std::string& path, const std::string&
     return to;
 }
 
+std::string CaseFolder::given(const std::string& path) const {
+    const fs::path inside = fs::path(path).lexically_relative(file("input"));
+    if (inside.empty() || *inside.begin() == ".." || *inside.begin() == ".") return path;
+    std::error_code code;
+    const fs::path target = fs::read_symlink(file("input") / *inside.begin(), code);
+    if (code) return path;
+    const fs::path below = inside.lexically_relative(*inside.begin());
+    return below == "." ? target.string() : (target / below).string();
+}
+
 Status CaseFolder::save() const {
     const nlohmann::ordered_json json{{"made", keys_}, {"proposed", proposed_}};
     return write_file(file(kMadeFile), std::string_view(json.dump(2) + "\n"));
@@ -203,7 +213,9 @@ Result<std::string> recipe_text(const MakeOptions& options,
         "option:\n"
         "# sonocase build --list-options\n"
         "name = " +
-        quoted(name) + "\n";
+        quoted(name) +
+        "\n# title = \"\"             # what trainees read in the list of cases; without it the "
+        "name\n";
     out += "preset = " + quoted(options.preset.empty() ? "balanced" : options.preset) + "\n";
     out += "\n[inputs]\n";
     SONOCASE_TRY(const auto labels, folder.link(found.labels, "labels"));

@@ -47,6 +47,8 @@ class CaseFolder {
     // Links a given path into input/ under a plain name that keeps its ending. Returns the path for
     // the recipe. A file that has others beside it, such as .nhdr, keeps its own path.
     Result<std::string> link(const std::string& path, const std::string& name);
+    // A path below a link in input/ as it was given, for a sentence; others as they are.
+    std::string given(const std::string& path) const;
 
     Status save() const;
 

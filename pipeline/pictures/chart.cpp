@@ -8,6 +8,7 @@
 #include <span>
 
 #include "formats/files/atomic_file.h"
+#include "formats/text/number_text.h"
 #include "pipeline/pictures/axis.h"
 #include "pipeline/pictures/canvas.h"
 #include "pipeline/pictures/chart_legend.h"
@@ -103,7 +104,7 @@ Layout lay_out(const Chart& chart, const Area& area) {
         if (!chart.equal_axes) break;
         equalise(layout.x, layout.y);
     }
-    if (!chart.x_of_things) layout.x_ticks = fitting_ticks(layout.x, false);
+    layout.x_ticks = fitting_ticks(layout.x, false);
     return layout;
 }
 
@@ -269,12 +270,63 @@ void draw_picture(const Chart& chart, const Area& cell, Canvas& canvas) {
         {cell.left + std::floor(0.5 * (cell.width - factor * w)), cell.bottom + kGapPx});
 }
 
+// Names above their bars, values behind them; below the rows the unit and what the marks mean.
+void draw_rows(const Chart& chart, const Area& cell, Canvas& canvas) {
+    constexpr double kMostPx = 44, kValuePx = 48, kBarPx = 14, kMarkPx = 6;
+    const TextStyle words{.colour = kInk}, bold{.bold = true, .colour = kInk};
+    double longest = 0;
+    int rows = 0;
+    for (const Series& s : chart.series) {
+        rows += s.style == SeriesStyle::bars;
+        for (const CanvasPoint& p : shown_points(chart, s)) longest = std::max(longest, p.y);
+    }
+    if (rows == 0) return;
+    const double left = cell.left + 2 * kGapPx, width = cell.width - 4 * kGapPx - kValuePx,
+                 top = cell.bottom + cell.height - kTitleTextPx - kGapPx,
+                 pitch = std::min(kMostPx, (top - cell.bottom - 3 * kLabelTextPx) / rows);
+    const auto length = [&](double value) {
+        return longest > 0 ? width * std::max(0.0, value) / longest : 0;
+    };
+    const auto bar_bottom = [&](double row) {
+        return top - (row - 1) * pitch - kTickTextPx - 3 - kBarPx;
+    };
+    const double unit = bar_bottom(rows) - kLabelTextPx - kGapPx, marks = unit - kLabelTextPx;
+    canvas.text(chart.y_label, {left, unit}, words);
+    double row = 0, beside = left;
+    for (std::size_t n = 0; n < chart.series.size(); ++n) {
+        const Series& s = chart.series[n];
+        const std::vector<CanvasPoint> shown = shown_points(chart, s);
+        if (s.style == SeriesStyle::bars) {
+            const double bottom = bar_bottom(++row);
+            canvas.text(shortened(s.name, words, cell.width - 3 * kGapPx),
+                        {left, bottom + kBarPx + 5}, words);
+            if (shown.empty()) continue;
+            const double value = shown[0].y, end = left + std::max(1.0, length(value));
+            const std::array<CanvasPoint, 4> bar{
+                {{left, bottom}, {end, bottom}, {end, bottom + kBarPx}, {left, bottom + kBarPx}}};
+            canvas.fill(bar, colour_of(s, 0));
+            canvas.text(fixed_text(value, value < 10 ? 2 : 1), {end + kGapPx, bottom + 2}, bold);
+            continue;
+        }
+        const LegendItem item{s.name, s.style, colour_of(s, n), s.width_px};
+        for (const CanvasPoint& p : shown)
+            draw_mark(canvas, item, {left + length(p.y), bar_bottom(p.x) + 0.5 * kBarPx}, kMarkPx);
+        draw_mark(canvas, item, {beside + kMarkPx, marks + 4}, kMarkPx);
+        canvas.text(s.name, {beside + 3 * kMarkPx, marks}, words);
+        beside += 5 * kMarkPx + text_width_px(s.name, words);
+    }
+}
+
 void draw_chart(const Chart& chart, const Area& cell, Canvas& canvas) {
     draw_title(canvas, chart.title,
                {cell.left + 0.5 * cell.width, cell.bottom + cell.height - kTitleTextPx + 9},
                {.size_px = 16, .bold = true}, cell.width - 2 * kGapPx);
     if (!chart.picture.empty()) {
         draw_picture(chart, cell, canvas);
+        return;
+    }
+    if (chart.rows) {
+        draw_rows(chart, cell, canvas);
         return;
     }
     std::vector<LegendItem> items, named;

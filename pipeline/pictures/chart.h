@@ -33,9 +33,9 @@ struct Chart {
     bool x_log = false;  // values <= 0 are left out
     bool y_log = false;
     std::vector<Series> series;
-    // Along x stand things that the legend names, one after another: no ticks, for numbers would
-    // mean nothing.
-    bool x_of_things = false;
+    // One below the other stand things, each with its name, a bar and its value: a series of bars
+    // for each. Other series mark rows: x is the number of the row, from 1, y the value.
+    bool rows = false;
     bool equal_axes = false;  // one unit has the same length in x and in y
     // A grey picture instead of the plot, below the title: rows from the top down, enlarged by a
     // whole factor to fill the cell.

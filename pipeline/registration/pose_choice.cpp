@@ -17,7 +17,8 @@ namespace {
 constexpr double kJudgeConstraintMm = 10, kJudgeScaleMm = 5, kNoCounterpartMm = 12;
 constexpr double kCloseScore = 1.10, kQuarterTurn = 1.25;
 // Bodies whose skin has no right and left fit their mirror image within 3 % either way; those whose
-// skin has fit it 15 % worse or more.
+// skin has fit it 15 % worse or more. Halves and quarters of right-handed bodies fit 4 % better to
+// 18 % worse in the mirror, and of left-handed ones 10 % better to 19 % worse.
 constexpr double kMirrorScore = 1.06;
 // Torsos without a waist, read all round, fit upside down 5 % better to 5 % worse: neither is told
 // then. Where half of the skin or more was not read they fit up to 14 % better.
@@ -137,6 +138,11 @@ std::vector<JudgedPose> judge_candidates(const FitContext& s,
     return judged;
 }
 
+// The score without the cost of the open side: of the skins and the other hints alone.
+double bare_mm(const JudgedPose& p) {
+    return std::sqrt(std::max(0.0, p.score_mm * p.score_mm - p.back_cost_mm2));
+}
+
 // A sweep of one flank is open towards the other. Taken for the back, that would roll the patient
 // by a quarter turn, which, unlike a half turn, fits clearly worse: then the open side says
 // nothing.
@@ -144,24 +150,21 @@ bool drop_open_side(const FitContext& s,
                     const RegisterOptions& options,
                     std::vector<JudgedPose>& judged) {
     if (!s.hints.back || options.open_side != "auto" || s.target.table.found) return false;
-    const auto bare = [](const JudgedPose& p) {
-        return std::sqrt(std::max(0.0, p.score_mm * p.score_mm - p.back_cost_mm2));
-    };
     const JudgedPose *with = &judged[0], *without = &judged[0];
     for (const JudgedPose& p : judged) {
         if (p.score_mm < with->score_mm) with = &p;
-        if (bare(p) < bare(*without)) without = &p;
+        if (bare_mm(p) < bare_mm(*without)) without = &p;
     }
     const auto front = [](const JudgedPose& p) {
         return p.rigid.target_from_skin.rotation.column(1);
     };
     const bool followed = std::abs(dot(front(*with), *s.hints.back)) > 0.7;
     const bool turned = std::abs(dot(front(*with), front(*without))) < 0.7;
-    if (followed && (!turned || bare(*with) < kQuarterTurn * bare(*without))) return false;
+    if (followed && (!turned || bare_mm(*with) < kQuarterTurn * bare_mm(*without))) return false;
     for (JudgedPose& p : judged) {
         const double rigid = p.rigid.score_mm;
         p.rigid.score_mm = std::sqrt(std::max(0.0, rigid * rigid - p.back_cost_mm2));
-        p.score_mm = bare(p);
+        p.score_mm = bare_mm(p);
         p.back_cost_mm2 = 0;
     }
     return true;
@@ -243,6 +246,13 @@ TargetSurface mirrored(const TargetSurface& target, const Mirror& mirror) {
     return m;
 }
 
+Rigid mirrored(const Rigid& from, const Mirror& mirror) {
+    return {Matrix3::from_columns(-mirror.turned(from.rotation.column(0)),
+                                  mirror.turned(from.rotation.column(1)),
+                                  mirror.turned(from.rotation.column(2))),
+            mirror.moved(Point3{} + from.translation) - Point3{}};
+}
+
 Given mirrored(Given given, const Mirror& mirror) {
     for (PoseHints::Place& mark : given.hints.landmarks) mark.target = mirror.moved(mark.target);
     for (Correspondence& mark : given.landmarks) mark.place = mirror.moved(mark.place);
@@ -290,15 +300,26 @@ void rank(std::vector<JudgedPose>& judged) {
 
 // What the scores of a pose and of its opposite tell.
 enum class Verdict { right, wrong, untold };
-Verdict verdict_of(const JudgedPose& best, double opposite_mm) {
-    const double margin =
-        best.skin_coverage < kWholeCoverage ? kOppositeScoreOfPart : kOppositeScore;
-    if (opposite_mm * margin < best.score_mm) return Verdict::wrong;
-    return opposite_mm > margin * best.score_mm ? Verdict::right : Verdict::untold;
+Verdict verdict_of(double here_mm, double opposite_mm, double margin) {
+    if (opposite_mm * margin < here_mm) return Verdict::wrong;
+    return opposite_mm > margin * here_mm ? Verdict::right : Verdict::untold;
+}
+double margin_of(const JudgedPose& best, double of_whole) {
+    return best.skin_coverage < kWholeCoverage ? kOppositeScoreOfPart : of_whole;
+}
+
+// How well the skins fit in the best of the poses that have not slid off.
+double best_fit_mm(const std::vector<JudgedPose>& judged) {
+    double best_coverage = 0, best = INFINITY;
+    for (const JudgedPose& p : judged) best_coverage = std::max(best_coverage, p.coverage);
+    for (const JudgedPose& p : judged)
+        if (!slid_off(p.coverage, best_coverage)) best = std::min(best, bare_mm(p));
+    return best;
 }
 
 // Left-handed axes: the surface is then a mirror image of the body, which a landmark off the
-// midline shows, or the skin where its right and left differ. Most torsos' hardly do.
+// midline shows, or the skin where its right and left differ. Most torsos' hardly do. The open side
+// has no part in it: where it is a flank's, it costs either hand a chance amount.
 void check_hands(const FitContext& s,
                  const Given& given,
                  const SplinePenalty& field,
@@ -306,40 +327,35 @@ void check_hands(const FitContext& s,
                  const std::vector<JudgedPose>& judged,
                  const Progress& progress,
                  PoseChoice* choice) {
-    const JudgedPose& best = choice->best;
-    const Rigid& pose = best.rigid.target_from_skin;
+    const Rigid& pose = choice->best.rigid.target_from_skin;
     const Mirror mirror{pose.rotation.column(0), pose.translation};
     const TargetSurface target = mirrored(s.target, mirror);
     const Given there = mirrored(given, mirror);
     RigidOptions rigid = options;
     rigid.hints = there.hints;
+    const double here = best_fit_mm(judged);
     // From the pose itself, and where that does not fit from the mirror images of the others: the
     // right pose of a left-handed surface is seldom the one that it seems to have. Before the axes
     // are called right, a search of the mirror image's own.
-    double score = INFINITY;
+    std::vector<JudgedPose> in_mirror;
     for (const JudgedPose& other : judged) {
-        const Rigid& from = other.rigid.target_from_skin;
-        const Rigid start{Matrix3::from_columns(-mirror.turned(from.rotation.column(0)),
-                                                mirror.turned(from.rotation.column(1)),
-                                                mirror.turned(from.rotation.column(2))),
-                          mirror.moved(Point3{} + from.translation) - Point3{}};
-        score = std::min(
-            score,
-            judge(s, target, there, field, refine_rigid(s.coarse, target, start, rigid)).score_mm);
-        if (score < kMirrorScore * best.score_mm) break;
+        const Rigid start = mirrored(other.rigid.target_from_skin, mirror);
+        in_mirror.push_back(
+            judge(s, target, there, field, refine_rigid(s.coarse, target, start, rigid)));
+        if (best_fit_mm(in_mirror) < kMirrorScore * here) break;
     }
-    if (score >= kMirrorScore * best.score_mm) {
-        for (const JudgedPose& p : judge_candidates(s, target, there, field, rigid, progress))
-            score = std::min(score, p.score_mm);
+    if (best_fit_mm(in_mirror) >= kMirrorScore * here) {
+        for (JudgedPose& p : judge_candidates(s, target, there, field, rigid, progress))
+            in_mirror.push_back(std::move(p));
     }
-    choice->mirror_score_mm = score;
+    const double score = choice->mirror_score_mm = best_fit_mm(in_mirror);
     const std::string scores =
-        text("it fits to %.2f mm in a mirror and to %.2f mm as given", score, best.score_mm);
-    if (score * kMirrorScore < best.score_mm) {
+        text("it fits to %.2f mm in a mirror and to %.2f mm as given", score, here);
+    if (score * kMirrorScore < here) {
         choice->handedness = "wrong: " + scores;
         choice->warnings.push_back("the surface looks like a mirror image of the patient: " +
                                    scores + "; check that its axes are right-handed");
-    } else if (score < kMirrorScore * best.score_mm) {
+    } else if (score < margin_of(choice->best, kMirrorScore) * here) {
         choice->handedness = "not told by the skin: " + scores +
                              "; a landmark off the midline would tell (--landmarks FILE.csv)";
     } else {
@@ -378,7 +394,7 @@ void check_head(const FitContext& s,
         "fits to %.2f mm the other way and to %.2f mm as given (%.2f and %.2f mm before the "
         "warp)",
         score, best, rigid_score, rigid_best);
-    Verdict verdict = verdict_of(choice->best, score);
+    Verdict verdict = verdict_of(best, score, margin_of(choice->best, kOppositeScore));
     if (verdict == Verdict::untold && choice->best.skin_coverage >= kWholeCoverage &&
         best * rigid_best > kOppositeBothWays * score * rigid_score)
         verdict = Verdict::wrong;
@@ -419,14 +435,12 @@ void check_front(const FitContext& s,
     double score =
         judge(s, s.target, turned, field, refine_rigid(s.coarse, s.target, start, rigid)).score_mm;
     for (const JudgedPose& p : judged)  // the search may have come to a better one
-        if (turned_front_to_back(best, p))
-            score = std::min(score,
-                             std::sqrt(std::max(0.0, p.score_mm * p.score_mm - p.back_cost_mm2)));
+        if (turned_front_to_back(best, p)) score = std::min(score, bare_mm(p));
     choice->front_turned_score_mm = score;
     const double here = best.score_mm;
     const std::string scores =
         text("it fits to %.2f mm turned front to back and to %.2f mm as it lies", score, here);
-    Verdict verdict = verdict_of(best, score);
+    Verdict verdict = verdict_of(here, score, margin_of(best, kOppositeScore));
     if (verdict == Verdict::right && score < kFrontScore * here) verdict = Verdict::untold;
     if (given.hints.back && verdict == Verdict::wrong) {
         choice->front = "wrong: " + scores;

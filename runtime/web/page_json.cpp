@@ -209,11 +209,8 @@ std::string procedure_json(const PagePlayer& player) {
     }
     const ProcedureState& s = view.state;
     Json questions = Json::array();
-    for (std::size_t i = 0; view.question >= 0 && i < p.items.size(); ++i) {
-        const ProcedureItem& item = p.items[i];
-        const bool asked =
-            item.from_step < 0 || s.steps[static_cast<std::size_t>(item.from_step)].performed;
-        if (item.rule != ItemRule::asked || !asked || s.items[i].held) continue;
+    for (int i = view.question; i >= 0; i = next_question(p, s, i)) {
+        const ProcedureItem& item = p.items[static_cast<std::size_t>(i)];
         Json question = Json::object();
         question["item"] = i;
         question["words"] = item.question;

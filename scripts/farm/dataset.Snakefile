@@ -5,10 +5,12 @@ import shlex
 shards = int(config["shards"])
 
 
-def launcher(threads, memory_mb):
+def launcher(threads):
+    """Without the memory, which each try asks for anew: snakemake evaluates params once for all tries of a job, and
+    resources for each."""
     if not config["launch"]:
         return ""
-    return shlex.join([config["launch"], config["run"], str(threads), str(memory_mb)])
+    return shlex.join([config["launch"], config["run"], str(threads)]) + ' "$memory_mb"'
 
 
 rule all:
@@ -27,6 +29,6 @@ rule shard:
             [config["sonoplay"], "dataset", config["recipe"], "-o", ".", "--frames", str(config["frames"])]
             + ["--seed", str(config["seed"]), "--shard", f"{wildcards.n}/{wildcards.shards}"]
         ),
-        launcher=lambda wildcards, threads, resources: launcher(threads, resources.mem_mb),
+        launcher=lambda wildcards, threads: launcher(threads),
     shell:
-        "exec >>farm/{wildcards.key}/{wildcards.n}-{wildcards.shards}.log 2>&1; {params.launcher} {params.command}"
+        "exec >>farm/{wildcards.key}/{wildcards.n}-{wildcards.shards}.log 2>&1; memory_mb={resources.mem_mb}; {params.launcher} {params.command}"

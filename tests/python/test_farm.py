@@ -39,10 +39,58 @@ def test_a_second_try_asks_by_what_the_first_took(tmp_path, monkeypatch):
     names = {"stages_of": {"case": {"import": {"memory_mb": 240}}}}
     exec(source[source.index("def peak"):source.index("def launcher")], names)
     asked = [names["memory_mb"]("case", "import", attempt) for attempt in (1, 2, 3)]
-    assert asked == [240, 480, 960]
+    assert asked == [304, 608, 1216]  # 240 and a fifth and 16 MB; twice; four times
     (tmp_path / "logs" / "case").mkdir(parents=True)
     (tmp_path / "logs" / "case" / "import.peak").write_text("1461\n")
     assert names["memory_mb"]("case", "import", 2) == 2191
+
+
+@pytest.fixture
+def killing_profile(tmp_path):
+    """Hands a job over as Slurm's does, and kills the first two that ask for memory."""
+    profile = tmp_path / "killing"
+    profile.mkdir()
+    (profile / "config.yaml").write_text("cores: 2\nrestart-times: 3\nquiet: rules\n")
+    launch = profile / "launch"
+    launch.write_text('#!/bin/sh\n'
+                      f'echo "$2 $3" >>{profile}/asked\n'
+                      f'[ "$(wc -l <{profile}/asked)" -gt 2 ] || exit 137\n'
+                      'shift 3\nexec "$@"\n')
+    launch.chmod(0o755)
+    return profile
+
+
+@needs_snakemake
+def test_each_try_of_a_stage_hands_more_memory_over(killing_profile, tmp_path):
+    stage = {"stage": "pack", "key": "0123456789abcdef", "needs": [], "memory_mb": 240, "threads": 2, "seconds": 1, "why": "new"}
+    plan = {"arguments": [], "cases": [{"name": "case", "recipe": "case", "done": False, "stages": [stage]}]}
+    stub = tmp_path / "sonocase"  # stands for sonocase: its plan, one stage's report, and a check without faults
+    stub.write_text(f"""#!{sys.executable}
+import pathlib, sys
+words = sys.argv[1:]
+if words[0] == "plan":
+    pathlib.Path(words[words.index("-o") + 1], "plan.json").write_text({json.dumps(plan)!r})
+elif words[0] == "build":
+    report = pathlib.Path(words[words.index("--report") + 1])
+    report.write_text('{{"digest": "d", "stages": [], "warnings": [], "peak_mb": 1}}')
+    pathlib.Path(words[words.index("-o") + 1]).touch()
+elif words[0] == "check":
+    print('{{"faults": [], "remarks": []}}')
+""")
+    stub.chmod(0o755)
+    folder = tmp_path / "farm"
+    (folder / "cases").mkdir(parents=True)
+    done = subprocess.run([FARM / "build-cases", "--sonocase", stub, "--profile", killing_profile, "-o", folder, "case"],
+                          capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr + (folder / "logs" / "snakemake.log").read_text()
+    assert (killing_profile / "asked").read_text().splitlines()[:3] == ["2 304", "2 608", "2 1216"]
+
+
+@needs_snakemake
+def test_each_try_of_a_shard_hands_more_memory_over(killing_profile, recipe, tmp_path):
+    done = render(recipe, "-o", tmp_path / "out", "--frames", 4, "--shards", 1, "--profile", killing_profile)
+    assert done.returncode == 0, done.stderr
+    assert (killing_profile / "asked").read_text().splitlines() == ["1 2000", "1 4000", "1 6000"]
 
 
 def test_the_page_says_what_is_faulty_what_failed_why_and_what_it_cost(tmp_path):

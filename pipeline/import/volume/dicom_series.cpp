@@ -159,6 +159,30 @@ void add_file(const std::string& path, DicomFolder& folder) {
     folder.slices.push_back(std::move(slice));
 }
 
+// Of scans of several series or examinations, the one that the segmentation names as its own, or
+// that shares its frame of reference, stays.
+void set_aside_other_scans(DicomFolder& folder) {
+    const auto is_of = [&](std::string DicomSlice::*of_slice, std::string DicomObject::*of_labels) {
+        return [&folder, of_slice, of_labels](const DicomSlice& slice) {
+            return std::any_of(folder.segmentations.begin(), folder.segmentations.end(),
+                               [&](const DicomObject& s) {
+                                   return !(s.*of_labels).empty() &&
+                                          s.*of_labels == slice.*of_slice;
+                               });
+        };
+    };
+    const auto keep = [&](const auto& theirs) {
+        const auto rest = std::stable_partition(folder.slices.begin(), folder.slices.end(), theirs);
+        if (rest == folder.slices.begin()) return false;
+        folder.other_slices.assign(std::make_move_iterator(rest),
+                                   std::make_move_iterator(folder.slices.end()));
+        folder.slices.erase(rest, folder.slices.end());
+        return true;
+    };
+    if (!keep(is_of(&DicomSlice::series, &DicomObject::series)))
+        keep(is_of(&DicomSlice::frame_of_reference, &DicomObject::frame_of_reference));
+}
+
 }  // namespace
 
 DicomFolder read_dicom_headers(const std::string& path) {
@@ -188,6 +212,7 @@ DicomFolder read_dicom_headers(const std::string& path) {
             return !is_scan(slice) && !slice.modality.empty();
         });
     }
+    set_aside_other_scans(folder);
     return folder;
 }
 
@@ -398,6 +423,13 @@ std::string series_text(const std::vector<DicomSlice>& slices) {
 }
 
 }  // namespace
+
+std::vector<std::string> series_texts(std::vector<DicomSlice> slices) {
+    std::vector<std::string> texts;
+    for (const auto& [uid, of_series] : by_series(std::move(slices)))
+        texts.push_back(series_text(of_series));
+    return texts;
+}
 
 Result<DicomStack> dicom_stack(std::vector<DicomSlice> slices, const std::string& folder) {
     auto series = by_series(std::move(slices));

@@ -78,6 +78,8 @@ struct DicomObject {
 
 struct DicomFolder {
     std::vector<DicomSlice> slices;           // CT, MR and others that may hold labels
+    std::vector<DicomSlice> other_slices;     // of series that no segmentation here was drawn on,
+                                              // where the one that it was drawn on lies here too
     std::vector<DicomObject> segmentations;   // of any kind
     std::vector<DicomObject> structure_sets;  // RTSTRUCT
     std::vector<DicomObject> others;          // reports, doses, localizers, ...
@@ -90,6 +92,9 @@ DicomFolder read_dicom_headers(const std::string& path);
 
 // "2 SR (a.dcm, ...), 1 PR (b.dcm)"; empty for none.
 std::string objects_text(const std::vector<DicomObject>& objects);
+
+// A phrase for each series: "70 x CT from IM1, 'Follow-up'".
+std::vector<std::string> series_texts(std::vector<DicomSlice> slices);
 
 struct DicomStack {
     std::vector<DicomSlice> slices;  // ascending along the stack

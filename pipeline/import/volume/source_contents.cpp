@@ -34,8 +34,9 @@ std::string two_patients(const DicomFolder& folder) {
         const std::string *path, *patient, *frame;
     };
     std::vector<Owner> owners;
-    for (const DicomSlice& s : folder.slices)
-        owners.push_back({&s.path, &s.patient, &s.frame_of_reference});
+    for (const auto* slices : {&folder.slices, &folder.other_slices})
+        for (const DicomSlice& s : *slices)
+            owners.push_back({&s.path, &s.patient, &s.frame_of_reference});
     for (const DicomObject& s : folder.segmentations)
         owners.push_back({&s.path, &s.patient, &s.frame_of_reference});
     for (const Owner& one : owners) {
@@ -48,13 +49,23 @@ std::string two_patients(const DicomFolder& folder) {
     return "";
 }
 
+// "ST1/SEG/IM1, ST2/SEG/IM1, ...": on a disc all may have one name.
+std::string paths_below(const std::string& folder, const std::vector<DicomObject>& objects) {
+    constexpr std::size_t kNamed = 3;
+    std::string paths;
+    for (std::size_t n = 0; n < std::min(kNamed, objects.size()); ++n)
+        paths += (n == 0 ? "" : ", ") +
+                 fs::path(objects[n].path).lexically_relative(folder).generic_string();
+    return objects.size() > kNamed ? paths + ", ..." : paths;
+}
+
 Result<SourceContents> dicom_contents(const DicomFolder& folder, const std::string& path) {
     if (const std::string both = two_patients(folder); !both.empty())
         return Error{"holds files of two patients, such as " + both, path,
                      "give the folder of one patient"};
     if (folder.segmentations.size() > 1)
         return Error{"holds " + std::to_string(folder.segmentations.size()) +
-                         " DICOM segmentations: " + objects_text(folder.segmentations),
+                         " DICOM segmentations: " + paths_below(path, folder.segmentations),
                      path, "give one of them by its own path, and the CT with --scan"};
     SourceContents found;
     if (!folder.slices.empty()) {
@@ -76,6 +87,8 @@ Result<SourceContents> dicom_contents(const DicomFolder& folder, const std::stri
                      folder.structure_sets.front().path,
                      "make a DICOM segmentation or masks of it, such as in 3D Slicer"};
     }
+    for (const std::string& other : series_texts(folder.other_slices))
+        found.left_out.push_back(other + ", on which the segmentation was not drawn");
     if (!folder.others.empty()) found.left_out.push_back(objects_text(folder.others));
     return found;
 }

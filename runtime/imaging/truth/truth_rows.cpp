@@ -43,21 +43,37 @@ HWY_INLINE IntOf<D> rays_of(D, const TruthRun& run, int first) {
 // Numbers of a vector of rays, # rays in all. Rays ascend along a run, mostly one per pixel: those
 // of a vector of pixels lie in two vectors of the table, and gathering takes several times as long.
 // Lanes past the run's end hold any number.
-template <class D, class I>
-HWY_INLINE hn::Vec<D> of_rays(D d, const float* table, int rays, I ray, int first, int last) {
-    const hn::RebindToSigned<D> di;
-    const int lanes = static_cast<int>(hn::Lanes(d));
-    if (last - first >= 2 * lanes || rays < 2 * lanes) return hn::GatherIndex(d, table, ray);
-    const int from = std::min(first, rays - 2 * lanes);
-    const auto width = hn::Set(di, lanes);
-    const auto at =
-        hn::Min(hn::Max(hn::Sub(ray, hn::Set(di, from)), hn::Zero(di)), hn::Set(di, 2 * lanes - 1));
-    const auto upper = hn::Gt(at, hn::Set(di, lanes - 1));
-    const auto index = hn::IndicesFromVec(d, hn::Sub(at, hn::IfThenElseZero(upper, width)));
-    return hn::IfThenElse(hn::RebindMask(d, upper),
-                          hn::TableLookupLanes(hn::LoadU(d, table + from + lanes), index),
-                          hn::TableLookupLanes(hn::LoadU(d, table + from), index));
-}
+template <class D>
+class RayNumbers {
+  public:
+    HWY_INLINE RayNumbers(D d, const TruthRun& run, int first, int used, int rays)
+        : ray_(rays_of(d, run, first)) {
+        const hn::RebindToSigned<D> di;
+        const int lanes = static_cast<int>(hn::Lanes(d));
+        const int lowest = run.ray[first];
+        gathers_ = run.ray[first + used - 1] - lowest >= 2 * lanes || rays < 2 * lanes;
+        if (gathers_) return;
+        from_ = std::min(lowest, rays - 2 * lanes);
+        ray_ = hn::Min(hn::Max(hn::Sub(ray_, hn::Set(di, from_)), hn::Zero(di)),
+                       hn::Set(di, 2 * lanes - 1));
+    }
+    HWY_INLINE hn::Vec<D> of(D d, const float* table) const {
+        if (gathers_) return hn::GatherIndex(d, table, ray_);
+        const hn::RebindToSigned<D> di;
+        const int lanes = static_cast<int>(hn::Lanes(d));
+        const auto upper = hn::Gt(ray_, hn::Set(di, lanes - 1));
+        const auto width = hn::IfThenElseZero(upper, hn::Set(di, lanes));
+        const auto index = hn::IndicesFromVec(d, hn::Sub(ray_, width));
+        return hn::IfThenElse(hn::RebindMask(d, upper),
+                              hn::TableLookupLanes(hn::LoadU(d, table + from_ + lanes), index),
+                              hn::TableLookupLanes(hn::LoadU(d, table + from_), index));
+    }
+
+  private:
+    IntOf<D> ray_;  // of the table, or of the two vectors from from_ on
+    int from_ = 0;
+    bool gathers_ = false;
+};
 
 // Contact: moves each point along its beam by gap exp(-r / reach).
 template <class D, class V>
@@ -70,9 +86,9 @@ HWY_INLINE void close_gap(D d,
                           V& air,
                           Places<D>& p) {
     const auto r = hn::LoadU(d, run.r_mm + first);
-    const auto gap = of_rays(d, f.gap_mm, f.rays, rays_of(d, run, first), run.ray[first],
-                             run.ray[first + used - 1]);
-    air = hn::Min(gap, hn::Zero(d));  // below 0: air
+    const auto gap = RayNumbers<D>(d, run, first, used, f.rays).of(d, f.gap_mm);
+    air = hn::Min(gap, hn::Zero(d));                        // below 0: air
+    if (hn::AllFalse(d, hn::Gt(gap, hn::Zero(d)))) return;  // nothing moves
     const auto shift =
         hn::Mul(hn::Max(gap, hn::Zero(d)), exp2_fading(d, hn::Mul(r, hn::Set(d, -f.per_reach))));
     auto along_x = hn::Zero(d), along_z = shift;
@@ -473,14 +489,13 @@ void shadows_of_run(const TruthRun& run,
     const int lanes = static_cast<int>(hn::Lanes(d));
     const int rays = static_cast<int>(first_hard_mm.size());
     for (int first = 0; first < run.count; first += lanes) {
-        const int last = std::min(first + lanes, run.count) - 1;
-        const auto dark = of_rays(d, first_hard_mm.data(), rays, rays_of(d, run, first),
-                                  run.ray[first], run.ray[last]);
+        const int used = std::min(lanes, run.count - first);
+        const auto dark = RayNumbers(d, run, first, used, rays).of(d, first_hard_mm.data());
         const auto behind = hn::Gt(hn::LoadU(d, run.r_mm + first), dark);
         HWY_ALIGN std::uint8_t bytes[kMaxLanes];
         hn::Store(hn::DemoteTo(d8, hn::IfThenElseZero(hn::RebindMask(di, behind), hn::Set(di, 1))),
                   d8, bytes);
-        std::copy_n(bytes, std::min(lanes, run.count - first), shadowed + first);
+        std::copy_n(bytes, used, shadowed + first);
     }
 }
 
@@ -492,15 +507,13 @@ void depths_of_run(const TruthFrameRows& f,
     const int lanes = static_cast<int>(hn::Lanes(d));
     for (int first = 0; first < run.count; first += lanes) {
         const auto r = hn::LoadU(d, run.r_mm + first);
-        const auto ray = rays_of(d, run, first);
-        const int lowest = run.ray[first],
-                  highest = run.ray[std::min(first + lanes, run.count) - 1];
-        auto depth = hn::Sub(r, of_rays(d, entry_mm, f.rays, ray, lowest, highest));
+        const RayNumbers ray(d, run, first, std::min(lanes, run.count - first), f.rays);
+        auto depth = hn::Sub(r, ray.of(d, entry_mm));
         if (f.gap_mm != nullptr) {
-            const auto gap =
-                hn::Max(of_rays(d, f.gap_mm, f.rays, ray, lowest, highest), hn::Zero(d));
-            depth =
-                hn::Add(depth, hn::Mul(gap, exp2_fading(d, hn::Mul(r, hn::Set(d, -f.per_reach)))));
+            const auto gap = hn::Max(ray.of(d, f.gap_mm), hn::Zero(d));
+            if (!hn::AllFalse(d, hn::Gt(gap, hn::Zero(d))))
+                depth = hn::Add(depth,
+                                hn::Mul(gap, exp2_fading(d, hn::Mul(r, hn::Set(d, -f.per_reach)))));
         }
         if (first + lanes <= run.count) {
             hn::StoreU(depth, d, depth_mm + first);

@@ -296,6 +296,8 @@ void show_next_hint(Notices& notices, const CaseState& loaded, Training& trainin
     }
     const int max_hints = static_cast<int>(exercise.hints.size()) + 1;
     training.hints_shown = std::min(training.hints_shown + 1, max_hints);
+    training.hint_step = loaded.frame().procedure.present_step;
+    training.hint_s = training.attempt->view().seconds;
 }
 
 bool shows_targets(const ScanState& scan, const Exercise& exercise) {

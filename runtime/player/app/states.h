@@ -169,6 +169,8 @@ struct Training {
     std::shared_ptr<Attempt> attempt;   // running; shared with the scan thread
     bool exam = false;                  // the attempt that runs or ran last gives no help
     int hints_shown = 0;                // of the exercise's in this attempt; one more: the targets
+    int hint_step = -1;                 // present step of the procedure as the last one was shown
+    double hint_s = 0;                  // and time of the attempt
     std::vector<bool> targets_reached;  // # targets; in free scanning or in the attempt
     StepsDone steps_done;               // of the attempt
     std::optional<SessionScore> score;  // of the last attempt

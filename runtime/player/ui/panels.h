@@ -55,6 +55,8 @@ struct TaskCardInput {
     bool live;           // false: no reading, values are dashes
     bool shows_targets;  // false: neither distances nor places
     int hints_shown;
+    int hint_step;      // of a procedure: its words are shown while this step is the present one,
+    double hint_s;      // and long enough to be read from this time of the attempt on
     bool has_result;    // of an attempt before
     int difficulty;     // of the attempt beside the exercise as written (draw_attempt.h)
     bool shows_finish;  // the card has the button that starts and ends an attempt

@@ -182,6 +182,13 @@ void PlayerWindow::carry_out(const request::ToggleAttempt&) {
 
 void PlayerWindow::carry_out(const request::NextHint&) {
     show_next_hint(player_.notices, loaded_, scan_.training);
+    if (!scan_.training.attempt || scan_.training.in_exam()) return;
+    const Procedure& procedure = loaded_.exercise().procedure;
+    if (!procedure.given()) return;
+    // It is read in the place of the questions that are asked now; they wait.
+    const ProcedureState& state = loaded_.frame().procedure.state;
+    int& put_off = view_.screen.put_off;
+    for (int next; (next = next_question(procedure, state, put_off)) >= 0;) put_off = next;
 }
 
 void PlayerWindow::carry_out(const request::SkipGuide&) {

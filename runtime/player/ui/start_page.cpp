@@ -176,7 +176,8 @@ void draw_continue(
     Box card = side.take_top(196, 12);
     ui.card(card, "continue");
     Box room = card.inset(16, 12);
-    ui.text(room.take_top(20), tr("Continue"), Type::small, colour::kDim);
+    ui.text(room.take_top(20), tr(progress.history.empty() ? "Begin with" : "Continue"),
+            Type::small, colour::kDim);
     const auto index =
         std::min(static_cast<std::size_t>(next.exercise), next.card->exercises.size() - 1);
     ui.text(room.take_top(26), title_of(next.card->exercises[index]), Type::heading, colour::kText,

@@ -66,20 +66,30 @@ std::string where_target(const TaskCardInput& input) {
     return text(tr(words), by_mm);
 }
 
-// The last hint asked for; empty: none was.
+const ProcedureView* shown_procedure(const TaskCardInput& input) {
+    return input.attempt && !input.replays ? input.procedure : nullptr;
+}
+
+// The last hint asked for; empty: none was, or the procedure is in a later step and needs the room.
 std::string hint_words(const TaskCardInput& input) {
+    constexpr double kReading_s = 12;
     const int count = static_cast<int>(input.texts.hints.size());
-    if (input.hints_shown == 0) return "";
+    const ProcedureView* procedure = shown_procedure(input);
+    const bool past = procedure && procedure->present_step != input.hint_step &&
+                      input.attempt->view().seconds > input.hint_s + kReading_s;
+    if (input.hints_shown == 0 || past) return "";
     return input.hints_shown > count ? where_target(input)
                                      : input.texts.hints[input.hints_shown - 1];
 }
 
-float hint_height(const Ui& ui, float width, const std::string& words) {
-    return 44 + (words.empty() ? 0 : ui.paragraph_height(width - 20, words, Type::small) + 10);
+float hint_head(const TaskCardInput& input) {
+    return shown_procedure(input) ? 30.0f : 44.0f;
 }
 
-const ProcedureView* shown_procedure(const TaskCardInput& input) {
-    return input.attempt && !input.replays ? input.procedure : nullptr;
+float hint_height(const Ui& ui, float width, const TaskCardInput& input) {
+    const std::string words = hint_words(input);
+    return hint_head(input) +
+           (words.empty() ? 0 : ui.paragraph_height(width - 20, words, Type::small) + 10);
 }
 
 // Of a part of a core: a target, a finding, or a label of the case.
@@ -120,7 +130,7 @@ std::string done_words(const TaskCardInput& input, const ProcedureState& state) 
 
 float below_values(const Ui& ui, float width, const TaskCardInput& input) {
     if (!input.attempt) return 0;
-    return 4 + (input.exam ? 40 : hint_height(ui, width, hint_words(input)));
+    return 4 + (input.exam ? 40 : hint_height(ui, width, input));
 }
 
 // What the values and the hints of the card take below what stands above them. Before the needle
@@ -251,9 +261,12 @@ void draw_procedure_steps(Ui& ui, Box& room, const TaskCardInput& input) {
                                 : "All steps are behind you: finish the attempt")
              : step->title;
     const float high = std::min(ui.paragraph_height(room.w, title, Type::bold), 40.0f);
-    if (room.h < high) return;
+    // A hint that was asked for says more of this step than its title.
+    const float free =
+        input.exam || hint_words(input).empty() ? 0 : below_values(ui, room.w, input);
+    if (room.h < high + free) return;
     ui.paragraph(room.take_top(high, 4), title, Type::bold, colour::kText, true);
-    if (!over) draw_small(ui, room, step->instruction, 0);
+    if (!over) draw_small(ui, room, step->instruction, free);
 }
 
 // What lies ready, two to a row from the bottom up; the needle of the mouse first.
@@ -305,26 +318,9 @@ bool wrapped_button(
     return pressed;
 }
 
-// The first item behind `after` that is asked now and has no answer; -1: none.
-int next_question(const TaskCardInput& input, int after) {
-    const std::vector<ProcedureItem>& items = input.exercise.procedure.items;
-    const ProcedureState& state = input.procedure->state;
-    for (int i = after + 1; i < static_cast<int>(items.size()); ++i) {
-        const auto at = static_cast<std::size_t>(i);
-        const int from = items[at].from_step;
-        const bool asked = from < 0 || state.steps[static_cast<std::size_t>(from)].performed;
-        if (items[at].rule == ItemRule::asked && asked && !state.items[at].held) return i;
-    }
-    return -1;
-}
-
-bool question_waits(const TaskCardInput& input) {
-    return next_question(input, input.put_off) >= 0;
-}
-
 // A question of the procedure, in all of the room; in small words where they do not fit.
-void draw_question(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
-    const int question = next_question(input, input.put_off);
+void draw_question(
+    Ui& ui, Box& room, const TaskCardInput& input, int question, TaskCardRequest& request) {
     const ExerciseTexts::Item& item = input.texts.items[static_cast<std::size_t>(question)];
     constexpr float kLater = 28, kBetween = 4;
     const float width = room.w - 20;
@@ -377,32 +373,16 @@ void draw_standing(Ui& ui, Box& room, const TaskCardInput& input) {
     }
 }
 
-// The card while a procedure runs.
-void draw_procedure(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
-    if (question_waits(input)) return draw_question(ui, room, input, request);
-    if (next_question(input, -1) >= 0) {  // was put off
-        ButtonStyle style;
-        style.link = true;
-        const char* words = "A question waits";
-        if (ui.button("ask", room.take_top(28, 4).take_left(ui.width(tr(words), Type::body) + 16),
-                      tr(words), style))
-            request.put_off = -1;
-    }
-    draw_tray(ui, room, input, request);  // before the steps: without it nothing can be done
-    draw_standing(ui, room, input);
-    draw_values(ui, room, input);
-}
-
 // Hints asked for so far, the last one in full; where that does not fit, one line and a button.
 void draw_hints(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
     const int count = static_cast<int>(input.texts.hints.size());
-    if (room.h < 44) return;
+    if (room.h < hint_head(input)) return;
     const std::string words = hint_words(input);
-    const float high = std::min(hint_height(ui, room.w, words), room.h);
+    const float high = std::min(hint_height(ui, room.w, input), room.h);
     Box card = room.take_top(high, 8);
     ui.card(card, "hint", colour::kRaised);
-    Box head = card.take_top(44);
-    ui.icon(Icon::hint, head.x + 10, head.y + 13, 18, colour::kDim);
+    Box head = card.take_top(hint_head(input));
+    ui.icon(Icon::hint, head.x + 10, head.y + 0.5f * head.h - 9, 18, colour::kDim);
     const std::string line =
         input.hints_shown == 0
             ? filled(tr("%d hints"), count + 1)
@@ -421,6 +401,28 @@ void draw_hints(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& 
     if (!words.empty() && card.h > 18)
         ui.paragraph({card.x + 10, card.y, card.w - 20, card.h - 2}, words, Type::small,
                      colour::kText, true);
+}
+
+// The card while a procedure runs.
+void draw_procedure(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
+    const Procedure& procedure = input.exercise.procedure;
+    const ProcedureState& state = input.procedure->state;
+    const int question = next_question(procedure, state, input.put_off);
+    if (question >= 0) return draw_question(ui, room, input, question, request);
+    if (next_question(procedure, state) >= 0) {  // was put off
+        ButtonStyle style;
+        style.link = true;
+        const char* words = "A question waits";
+        if (ui.button("ask", room.take_top(28, 4).take_left(ui.width(tr(words), Type::body) + 16),
+                      tr(words), style))
+            request.put_off = -1;
+    }
+    draw_tray(ui, room, input, request);  // before the steps: without it nothing can be done
+    draw_standing(ui, room, input);
+    draw_values(ui, room, input);
+    if (input.exam) return;
+    room.take_top(4);
+    draw_hints(ui, room, input, request);
 }
 
 void draw_guide(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {

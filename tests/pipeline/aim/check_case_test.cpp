@@ -154,7 +154,7 @@ TEST(CheckCase, ThePageShowsWhatTheFitDoesNotKnow) {
     bundle.manifest.stages.push_back(fit);
     const std::string shown = page();
     EXPECT_NE(shown.find("What is not known"), std::string::npos);
-    EXPECT_NE(shown.find("two landmarks far apart would bring liver from 11.2 to 3.4 mm"),
+    EXPECT_NE(shown.find("Two landmarks far apart would bring liver from 11.2 to 3.4 mm"),
               std::string::npos);
     const auto pictures = [](const std::string& text) {
         int n = 0;

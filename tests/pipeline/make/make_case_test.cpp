@@ -8,11 +8,13 @@
 #include <cmath>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
 #include <set>
 
 #include "../import/volume_files.h"
 #include "formats/exercise/exercise.h"
+#include "formats/exercise/exercise_texts.h"
 #include "formats/files/load_save.h"
 #include "pipeline/anatomy/analytic_torso.h"
 #include "pipeline/check/check_case.h"
@@ -171,6 +173,16 @@ TEST_F(MakeCase, a_study_becomes_a_case_that_its_check_calls_good_and_a_second_r
     EXPECT_NEAR(skin.centre().x, body.centre().x, 5);
     EXPECT_NEAR(skin.centre().y, body.centre().y, 5);
     EXPECT_NEAR(skin.centre().z, body.centre().z, 5);
+    // A trainee tells exercises by their titles, in each language.
+    std::map<std::string, std::set<std::string>> titles;
+    for (const EmbeddedExercise& embedded : bundle->exercises) {
+        const auto exercise = parse_exercise(embedded.toml, embedded.name);
+        const auto texts = parse_exercise_texts(embedded.toml, embedded.name);
+        ASSERT_TRUE(exercise && texts);
+        EXPECT_TRUE(titles[""].insert(exercise->title).second) << exercise->title;
+        for (const ExerciseTexts& in : *texts)
+            EXPECT_TRUE(titles[in.language].insert(in.title).second) << in.title;
+    }
     // Needles enter through skin, and not where the scan cuts the body above and below.
     const Box3 box = bundle->grid.bounds();
     for (const EmbeddedExercise& embedded : bundle->exercises) {
@@ -301,6 +313,63 @@ TEST_F(MakeCase, two_patients_in_a_folder) {
     Study{.patient_of_scan = "2"}.write(folder_, "disc");
     const Outcome outcome = make("disc");
     expect_sentence(outcome, "two patients, such as 100.dcm and seg.dcm");
+}
+
+// A disc holds earlier examinations too, often with more slices than the one that was segmented.
+TEST_F(MakeCase, an_earlier_examination_beside_the_one_that_was_segmented) {
+    Study{.drawn = is_organ}.write(folder_, "disc");
+    TinyVolume earlier = tiny(torso());
+    earlier.size.z += 20;
+    DicomCounts air;
+    air.is_signed = true;
+    air.person = "1";
+    air.frame_of_reference = "1.2.3.99";
+    air.values.assign(static_cast<std::size_t>(earlier.size.x) *
+                          static_cast<std::size_t>(earlier.size.y) *
+                          static_cast<std::size_t>(earlier.size.z),
+                      -1000);
+    earlier.voxels.resize(air.values.size());
+    for (int k = 0; k < earlier.size.z; ++k)
+        folder_.write("disc/before/" + std::to_string(100 + k) + ".dcm",
+                      dicom_slice(earlier, k, "1.2.3.98", air));
+    const Outcome outcome = make("disc");
+    ASSERT_TRUE(outcome.made) << outcome.sentence;
+    EXPECT_TRUE(outcome.made->faults.empty());
+    const std::string slices = std::to_string(torso().grid.size.z) + " CT slices";
+    EXPECT_TRUE(outcome.decided("scan: " + slices));
+    EXPECT_TRUE(outcome.decided("left out: " + std::to_string(earlier.size.z) + " x CT"));
+
+    // Of another patient it is refused all the same.
+    air.person = "2";
+    folder_.write("disc/before/100.dcm", dicom_slice(earlier, 0, "1.2.3.98", air));
+    expect_sentence(make("disc"), "two patients, such as 100.dcm and 100.dcm");
+}
+
+// What is written here lies behind links in the case's folder; the author knows his own paths.
+TEST_F(MakeCase, a_lost_slice_is_named_where_it_lies) {
+    Study{}.write(folder_, "disc");
+    std::filesystem::remove(folder_ / "disc/ct/120.dcm");
+    const Outcome outcome = make("disc");
+    expect_sentence(outcome, "missing between");
+    EXPECT_NE(outcome.sentence.find(folder_ / "disc/ct/1"), std::string::npos) << outcome.sentence;
+}
+
+TEST_F(MakeCase, names_of_another_language) {
+    Study german;
+    for (Label& label : german.labels.labels)
+        if (is_organ(label.name) && label.name != "outside") label.name = "Organ " + label.name;
+    german.drawn = [](const std::string& name) { return name.starts_with("Organ "); };
+    german.write(folder_, "disc");
+    const Outcome outcome = make("disc");
+    expect_sentence(outcome, "unknown names: ");
+    expect_sentence(outcome, "--table FILE");
+    // The names as the segmentation has them, and not what the scan filled in beside them.
+    const auto renamed =
+        std::count_if(german.labels.labels.begin(), german.labels.labels.end(),
+                      [](const Label& label) { return label.name.starts_with("Organ "); });
+    EXPECT_NE(outcome.sentence.find(" and " + std::to_string(renamed - 4) + " more;"),
+              std::string::npos)
+        << renamed << ": " << outcome.sentence;
 }
 
 TEST_F(MakeCase, a_phantom) {

@@ -67,18 +67,27 @@ std::vector<LegendItem> six_items() {
         {"paper", SeriesStyle::dashed, {9, 9, 9, 255}, 12}};
 }
 
-// Bars of things that the legend names: "1.5" along the axis would be a part and a half.
-TEST(Chart, ThingsHaveNoNumbersAlongTheAxis) {
+// Rows: each thing's name and value beside its bar, none of them on another or out of the picture.
+TEST(Chart, RowsHaveTheirNamesAndValuesAndNoAxis) {
     Chart chart;
-    chart.series = {{"import", {1}, {0.9}, SeriesStyle::bars},
-                    {"warp", {2}, {0.2}, SeriesStyle::bars}};
-    const auto has = [&](const std::string& tick) {
-        return chart_svg({{chart}}).find(">" + tick + "<") != std::string::npos;
-    };
-    EXPECT_TRUE(has("1.5"));
-    chart.x_of_things = true;
-    EXPECT_FALSE(has("1.5"));
-    EXPECT_TRUE(has("0.6"));
+    chart.rows = true;
+    for (int n = 1; n <= 8; ++n)
+        chart.series.push_back({"thing " + std::to_string(n), {0}, {11.1 * n}, SeriesStyle::bars});
+    chart.series.push_back({"with help", {2}, {5}, SeriesStyle::diamonds});
+    const std::string svg = chart_svg({{chart}, 1, 400, 420});
+    std::vector<double> heights;
+    for (int n = 1; n <= 8; ++n) {
+        const std::size_t name = svg.find(">thing " + std::to_string(n) + "<");
+        ASSERT_NE(name, std::string::npos) << n;
+        const std::size_t from = svg.rfind(" y=\"", name);
+        ASSERT_NE(from, std::string::npos);
+        heights.push_back(std::stod(svg.substr(from + 4)));
+        if (n > 1) EXPECT_GT(heights[n - 1] - heights[n - 2], 30);
+    }
+    EXPECT_LT(heights.back(), 400);
+    for (const char* words : {">11.1<", ">88.8<", ">with help<"})
+        EXPECT_NE(svg.find(words), std::string::npos) << words;
+    EXPECT_EQ(svg.find(">50<"), std::string::npos);
 }
 
 TEST(ChartLegend, FrameHoldsWordsAndSymbolsAndNothingOverlaps) {

@@ -320,6 +320,39 @@ TEST_F(WindowMended, TheCardOfAScanSaysNothingOfNeedles) {
     EXPECT_TRUE(says("needle", "Skin punctures") && says("needle", "Tip in view"));
 }
 
+// They come in the place of a question, which waits, also where the card has little room; an exam
+// gives none and keeps its question.
+TEST_F(WindowMended, HintsOfAProcedureAreRead) {
+    CaseBundle bundle = sonocase::testing::small_case();
+    std::string toml = sonocase::testing::small_procedure_toml();
+    toml.insert(toml.find("kind ="),
+                "hints = [\"Slide to the dark ring.\", \"Press, and it "
+                "gives way: that tells a vein from the artery beside it.\"]\n");
+    bundle.exercises.push_back({"line", toml});
+    toml.insert(toml.find("kind ="), "mode = \"exam\"\n");
+    toml.replace(toml.find("\"line\""), 6, "\"exam\"");
+    bundle.exercises.push_back({"exam", toml});
+    ASSERT_TRUE(save_bundle(bundle, bundle_));
+    ASSERT_EQ(run("--exercise line", "wait 6\nkey b\nwait 6\n" + shot("asked") + "key h\nwait 6\n" +
+                                         shot("first") + "key h\nwait 6\n" + shot("second") +
+                                         "press ask\nwait 6\npress option1\n" + "wait 20\n" +
+                                         shot("answered") + "quit\n")
+                  .status,
+              0);
+    EXPECT_TRUE(says("asked", "What is below the skin?"));
+    EXPECT_FALSE(says("first", "What is below the skin?"));
+    EXPECT_TRUE(says("first", "Slide to the dark ring.") && says("first", " ask\n"));
+    EXPECT_TRUE(says("second", "tells a vein"));
+    EXPECT_TRUE(says("answered", "tells a vein"));
+    EXPECT_FALSE(says("answered", " ask\n"));
+    ASSERT_EQ(
+        run("--exercise exam", "wait 6\nkey b\nwait 6\nkey h\nwait 6\n" + shot("exam") + "quit\n")
+            .status,
+        0);
+    EXPECT_TRUE(says("exam", "What is below the skin?"));
+    EXPECT_FALSE(says("exam", "Slide to the dark ring."));
+}
+
 // A second F5 leaves, the first only asks.
 TEST_F(WindowMended, ChangingTheExerciseDuringAnAttemptAsksFirst) {
     ASSERT_EQ(run("", "wait 6\nkey b\nwait 6\nkey f5\nwait 3\n" + shot("asked") +
