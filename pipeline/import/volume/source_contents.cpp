@@ -27,9 +27,14 @@ std::string name_of(const std::string& path) {
     return fs::path(path).filename().string();
 }
 
-// Two files of different patients, named by their paths; empty: all are of one.
+// "ST1/SEG/IM1": on a disc all may have one name.
+std::string path_below(const std::string& folder, const std::string& path) {
+    return fs::path(path).lexically_relative(folder).generic_string();
+}
+
+// Two files of different patients, named by their paths below the folder; empty: all are of one.
 // IDs alone do not tell: anonymised copies of one examination may have two.
-std::string two_patients(const DicomFolder& folder) {
+std::string two_patients(const DicomFolder& folder, const std::string& path) {
     struct Owner {
         const std::string *path, *patient, *frame;
     };
@@ -44,23 +49,21 @@ std::string two_patients(const DicomFolder& folder) {
         if (first.patient->empty() || one.patient->empty() || *first.patient == *one.patient)
             continue;
         if (!first.frame->empty() && *first.frame == *one.frame) continue;
-        return name_of(*first.path) + " and " + name_of(*one.path);
+        return path_below(path, *first.path) + " and " + path_below(path, *one.path);
     }
     return "";
 }
 
-// "ST1/SEG/IM1, ST2/SEG/IM1, ...": on a disc all may have one name.
 std::string paths_below(const std::string& folder, const std::vector<DicomObject>& objects) {
     constexpr std::size_t kNamed = 3;
     std::string paths;
     for (std::size_t n = 0; n < std::min(kNamed, objects.size()); ++n)
-        paths += (n == 0 ? "" : ", ") +
-                 fs::path(objects[n].path).lexically_relative(folder).generic_string();
+        paths += (n == 0 ? "" : ", ") + path_below(folder, objects[n].path);
     return objects.size() > kNamed ? paths + ", ..." : paths;
 }
 
 Result<SourceContents> dicom_contents(const DicomFolder& folder, const std::string& path) {
-    if (const std::string both = two_patients(folder); !both.empty())
+    if (const std::string both = two_patients(folder, path); !both.empty())
         return Error{"holds files of two patients, such as " + both, path,
                      "give the folder of one patient"};
     if (folder.segmentations.size() > 1)

@@ -312,7 +312,7 @@ TEST_F(MakeCase, no_skin) {
 TEST_F(MakeCase, two_patients_in_a_folder) {
     Study{.patient_of_scan = "2"}.write(folder_, "disc");
     const Outcome outcome = make("disc");
-    expect_sentence(outcome, "two patients, such as 100.dcm and seg.dcm");
+    expect_sentence(outcome, "two patients, such as ct/100.dcm and seg/seg.dcm");
 }
 
 // A disc holds earlier examinations too, often with more slices than the one that was segmented.
@@ -342,7 +342,7 @@ TEST_F(MakeCase, an_earlier_examination_beside_the_one_that_was_segmented) {
     // Of another patient it is refused all the same.
     air.person = "2";
     folder_.write("disc/before/100.dcm", dicom_slice(earlier, 0, "1.2.3.98", air));
-    expect_sentence(make("disc"), "two patients, such as 100.dcm and 100.dcm");
+    expect_sentence(make("disc"), "two patients, such as ct/100.dcm and before/100.dcm");
 }
 
 // What is written here lies behind links in the case's folder; the author knows his own paths.
