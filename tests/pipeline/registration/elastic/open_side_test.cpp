@@ -382,8 +382,9 @@ std::vector<Part> parts_of(const Pair& pair) {
 }
 
 // Of a part of a body either hand is as good as the other, mostly; what its fit costs more than
-// that of the other is chance, and no reason to call right axes wrong. Ten parts of four bodies,
-// each as it is and in a mirror. SONOCASE_SHOW=1 prints what is said.
+// that of the other is chance, and no reason to call right axes wrong. Of ten parts of four bodies
+// every other one, as it is and in a mirror; all of them with SONOCASE_PARTS=all. SONOCASE_SHOW=1
+// prints what is said.
 TEST(Handedness, OfPartialSweepsIsNotCalledWrongWhereItIsRight) {
     std::vector<Pair> pairs;
     for (const auto& [name, build, seed, up] :
@@ -404,9 +405,12 @@ TEST(Handedness, OfPartialSweepsIsNotCalledWrongWhereItIsRight) {
         pairs.push_back({"quadratic", *ct, sweep_of(ct->skin, truth, random), turn.column(2),
                          -turn.column(1), true});
     }
-    int right = 0, called_wrong = 0, called_right = 0, named = 0;
+    const bool all = std::getenv("SONOCASE_PARTS") != nullptr;
+    int right = 0, called_wrong = 0, called_right = 0, named = 0, next = 0;
     for (const Pair& pair : pairs) {
+        ++next;  // other parts of each body
         for (const Part& part : parts_of(pair)) {
+            if (++next % 2 == 0 && !all) continue;
             for (const bool mirror : {false, true}) {
                 Surface sweep = part.sweep;
                 RegisterOptions options;
@@ -437,10 +441,10 @@ TEST(Handedness, OfPartialSweepsIsNotCalledWrongWhereItIsRight) {
         std::printf("of %d parts in a mirror %d named\n", right, named);
     EXPECT_EQ(called_wrong, 0);
     if (!ct) GTEST_SKIP() << "no " SONOCASE_DATA;
-    EXPECT_EQ(right, 40);
-    HardCase alarms("of 40 parts of sweeps, called mirrored", HardCase::at_most, 0, "");
+    EXPECT_EQ(right, all ? 40 : 20);
+    HardCase alarms("of 20 parts of sweeps, called mirrored", HardCase::at_most, 0, "");
     alarms.see(called_wrong);
-    HardCase missed("of 40 in a mirror, called right", HardCase::at_most, 0, "");
+    HardCase missed("of 20 in a mirror, called right", HardCase::at_most, 0, "");
     missed.see(called_right);
 }
 
