@@ -296,7 +296,7 @@ void show_next_hint(Notices& notices, const CaseState& loaded, Training& trainin
     }
     const int max_hints = static_cast<int>(exercise.hints.size()) + 1;
     training.hints_shown = std::min(training.hints_shown + 1, max_hints);
-    training.hint_step = loaded.frame().procedure.present_step;
+    if (exercise.procedure.given()) training.hint_step = loaded.frame().procedure.present_step;
     training.hint_s = training.attempt->view().seconds;
 }
 
