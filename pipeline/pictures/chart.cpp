@@ -272,7 +272,7 @@ void draw_picture(const Chart& chart, const Area& cell, Canvas& canvas) {
 
 // Names above their bars, values behind them; below the rows the unit and what the marks mean.
 void draw_rows(const Chart& chart, const Area& cell, Canvas& canvas) {
-    constexpr double kMostPx = 44, kValuePx = 48, kBarPx = 14, kMarkPx = 6;
+    constexpr double kMaxPx = 44, kValuePx = 48, kBarPx = 14, kMarkPx = 6;
     const TextStyle words{.colour = kInk}, bold{.bold = true, .colour = kInk};
     double longest = 0;
     int rows = 0;
@@ -283,7 +283,7 @@ void draw_rows(const Chart& chart, const Area& cell, Canvas& canvas) {
     if (rows == 0) return;
     const double left = cell.left + 2 * kGapPx, width = cell.width - 4 * kGapPx - kValuePx,
                  top = cell.bottom + cell.height - kTitleTextPx - kGapPx,
-                 pitch = std::min(kMostPx, (top - cell.bottom - 3 * kLabelTextPx) / rows);
+                 pitch = std::min(kMaxPx, (top - cell.bottom - 3 * kLabelTextPx) / rows);
     const auto length = [&](double value) {
         return longest > 0 ? width * std::max(0.0, value) / longest : 0;
     };

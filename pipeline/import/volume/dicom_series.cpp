@@ -159,8 +159,8 @@ void add_file(const std::string& path, DicomFolder& folder) {
     folder.slices.push_back(std::move(slice));
 }
 
-// Of scans of several series or examinations, the one that the segmentation names as its own, or
-// that shares its frame of reference, stays.
+// Where several series or examinations lie here, the scan stays that the segmentation names as its
+// own, or that shares its frame of reference.
 void set_aside_other_scans(DicomFolder& folder) {
     const auto is_of = [&](std::string DicomSlice::*of_slice, std::string DicomObject::*of_labels) {
         return [&folder, of_slice, of_labels](const DicomSlice& slice) {

@@ -339,7 +339,7 @@ TEST_F(MakeCase, an_earlier_examination_beside_the_one_that_was_segmented) {
     EXPECT_TRUE(outcome.decided("scan: " + slices));
     EXPECT_TRUE(outcome.decided("left out: " + std::to_string(earlier.size.z) + " x CT"));
 
-    // Of another patient it is refused all the same.
+    // An earlier examination of another patient is refused all the same.
     air.person = "2";
     folder_.write("disc/before/100.dcm", dicom_slice(earlier, 0, "1.2.3.98", air));
     expect_sentence(make("disc"), "two patients, such as ct/100.dcm and before/100.dcm");

@@ -381,10 +381,10 @@ std::vector<Part> parts_of(const Pair& pair) {
     return parts;
 }
 
-// Of a part of a body either hand is as good as the other, mostly; what its fit costs more than
-// that of the other is chance, and no reason to call right axes wrong. Of ten parts of four bodies
-// every other one, as it is and in a mirror; all of them with SONOCASE_PARTS=all. SONOCASE_SHOW=1
-// prints what is said.
+// Either hand mostly fits a part of a body as well as the other; what one costs more is chance, and
+// no reason to call right axes wrong. The test takes every other one of ten parts of four bodies,
+// as it is and in a mirror, and all of them with SONOCASE_PARTS=all. SONOCASE_SHOW=1 prints what is
+// said.
 TEST(Handedness, OfPartialSweepsIsNotCalledWrongWhereItIsRight) {
     std::vector<Pair> pairs;
     for (const auto& [name, build, seed, up] :
