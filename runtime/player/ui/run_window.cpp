@@ -260,7 +260,8 @@ void PlayerWindow::show_picture(const PictureClock& clock) {
         input = script_.next(now_s, shot, quit);
         if (script_.of_instructor()) instructor_shot.swap(shot);
     }
-    display.small_view.saved = !shot.empty();
+    const bool pictured = !shot.empty() && !script_.boxes_alone();
+    display.small_view.saved = pictured;
     window.begin_frame(input);
     const bool fresh = loaded.scan->refresh();
     if (fresh || view.hover.outlines != was_outlined_)
@@ -298,7 +299,7 @@ void PlayerWindow::show_picture(const PictureClock& clock) {
     if (arguments.frames > 0 && shown_ >= arguments.frames) quit = true;
     const bool last = quit || window.should_close();
     const double drawn_s = steady_seconds();
-    const bool saved = !shot.empty() || (last && !arguments.screenshot.empty());
+    const bool saved = pictured || (last && !arguments.screenshot.empty());
     if (script_.only_shots() && !saved) {
         window.end_frame_unseen();
     } else {
@@ -309,7 +310,7 @@ void PlayerWindow::show_picture(const PictureClock& clock) {
                    1e3 * (steady_seconds() - drawn_s));
     }
     if (!shot.empty()) {
-        Status written = save_screenshot(window, shot);
+        Status written = pictured ? save_screenshot(window, shot) : Status(Done{});
         if (written) written = write_boxes(ui_, shot);
         if (!written) notices.error(written.error().message());
     }

@@ -123,30 +123,30 @@ std::string longest_values() {
 }
 
 std::string script(const std::string& folder) {
-    const auto shot = [&](const char* name) { return "shot " + folder + "/" + name + ".png\n"; };
-    return "only-shots\nwait 4\n" + shot("scan") + "key f5\nwait 4\nkey b\nwait 4\n" +
-           shot("question") + "press later\nwait 2\npress ask\nwait 2\n" + shot("asked") +
-           "press later\nkey j\nkey k\nkey l\nkey i\nkey i ctrl\nwait 4\n" + shot("tray") +
-           "key b\nwait 8\n" + shot("checklist") +
+    const auto boxes = [&](const char* name) { return "boxes " + folder + "/" + name + "\n"; };
+    return "only-shots\nwait 4\n" + boxes("scan") + "key f5\nwait 4\nkey b\nwait 4\n" +
+           boxes("question") + "press later\nwait 2\npress ask\nwait 2\n" + boxes("asked") +
+           "press later\nkey j\nkey k\nkey l\nkey i\nkey i ctrl\nwait 4\n" + boxes("tray") +
+           "key b\nwait 8\n" + boxes("checklist") +
            "key escape\nkey f5 shift\nwait 4\nkey b\nkey n\nhold w 6\nkey h\nwait 2\n" +
-           shot("attempt") + "key space\nwait 2\n" + shot("frozen") +
-           "key space\nwait 2\nkey b\nwait 3\n" + shot("after") + "key p\nwait 2\n" +
-           shot("replay") + "key p\nwait 2\nkey escape\n" + "key f1\nwait 2\n" + shot("help") +
-           "key f1\nkey f9\nwait 2\n" + shot("tracker") + "key f9\nkey f10\nwait 2\n" +
-           shot("effects") + "key f10\nkey f8\nwait 2\n" + shot("exercises") +
-           "press in_exam\npress marks\nwait 2\n" + shot("marks") +
-           "key escape\nkey f12\nwait 2\nkey f3\nwait 2\n" + shot("setup") + "key f3\nhold u 6\n" +
-           shot("named") + "key 2 shift\nwait 6\n" + shot("colour") + "key 3 shift\nwait 6\n" +
-           shot("spectrum") + "key 4 shift\nwait 6\n" + shot("motion") + longest_values() +
-           "wait 2\n" + shot("longest") + "key 1 shift\nkey f2\nwait 30\n" + shot("cases") +
-           "press settings\nwait 2\n" + shot("settings") + "press Notices\nwait 2\n" +
-           shot("notices") + "key escape\npress settings\nwait 2\npress Sign in\nwait 2\n" +
-           shot("sign_in") +
+           boxes("attempt") + "key space\nwait 2\n" + boxes("frozen") +
+           "key space\nwait 2\nkey b\nwait 3\n" + boxes("after") + "key p\nwait 2\n" +
+           boxes("replay") + "key p\nwait 2\nkey escape\n" + "key f1\nwait 2\n" + boxes("help") +
+           "key f1\nkey f9\nwait 2\n" + boxes("tracker") + "key f9\nkey f10\nwait 2\n" +
+           boxes("effects") + "key f10\nkey f8\nwait 2\n" + boxes("exercises") +
+           "press in_exam\npress marks\nwait 2\n" + boxes("marks") +
+           "key escape\nkey f12\nwait 2\nkey f3\nwait 2\n" + boxes("setup") + "key f3\nhold u 6\n" +
+           boxes("named") + "key 2 shift\nwait 6\n" + boxes("colour") + "key 3 shift\nwait 6\n" +
+           boxes("spectrum") + "key 4 shift\nwait 6\n" + boxes("motion") + longest_values() +
+           "wait 2\n" + boxes("longest") + "key 1 shift\nkey f2\nwait 30\n" + boxes("cases") +
+           "press settings\nwait 2\n" + boxes("settings") + "press Notices\nwait 2\n" +
+           boxes("notices") + "key escape\npress settings\nwait 2\npress Sign in\nwait 2\n" +
+           boxes("sign_in") +
            "key escape\npress settings\nwait 2\npress Class\nwait 4\npress Ann Onymous\nwait 2\n" +
-           shot("class") + "key escape\npress settings\nwait 2\npress Course\nwait 4\n" +
-           shot("course") + "press option1\nwait 4\n" + shot("module") +
-           "press module_second\nwait 4\n" + shot("locked") +
-           "press module_first\nwait 4\npress expert\nwait 10\n" + shot("watched") + "quit\n";
+           boxes("class") + "key escape\npress settings\nwait 2\npress Course\nwait 4\n" +
+           boxes("course") + "press option1\nwait 4\n" + boxes("module") +
+           "press module_second\nwait 4\n" + boxes("locked") +
+           "press module_first\nwait 4\npress expert\nwait 10\n" + boxes("watched") + "quit\n";
 }
 
 void check(const std::vector<SeenBox>& boxes, double width, double height) {
@@ -276,7 +276,7 @@ void tour(const std::string& size, double scale, const std::string& language) {
     std::string picture;
     for (const char* page : kPages) {
         SCOPED_TRACE(page);
-        const std::vector<SeenBox> boxes = load_boxes(folder / (std::string(page) + ".png.boxes"));
+        const std::vector<SeenBox> boxes = load_boxes(folder / (std::string(page) + ".boxes"));
         check(boxes, width_px / used + 1, height_px / used + 1);
         const auto has = [&](const std::string& name) {
             return std::any_of(boxes.begin(), boxes.end(),
