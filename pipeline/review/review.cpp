@@ -155,9 +155,11 @@ void add_probe_bar(const ReviewInput& input, const TimeAxis& axis, double y, Svg
         axis, times, [&](std::size_t i) { return on_skin[i]; }, y, "class=\"bar probe\"", svg);
 }
 
-// One mark per event, described where the pointer rests on it; names only if there is room.
+// One mark per event, described where the pointer rests on it; names below the marks, in the first
+// of two rows that has room.
 void add_events(const ReviewInput& input, const TimeAxis& axis, double y, Svg& svg) {
-    double free_from = -1;
+    constexpr double kLetter = 6.2, kRow = 14, kGap = 8;
+    double free_from[] = {-1, -1};
     for (const SessionEvent& event : input.session.events) {
         const double x = axis.x(event.time_s);
         const std::string kind = event.name.substr(0, 5) == "no_go" ? "bad"
@@ -166,14 +168,16 @@ void add_events(const ReviewInput& input, const TimeAxis& axis, double y, Svg& s
         svg.open_group(
             "class=\"event " + kind + "\"",
             svg_number(event.time_s - axis.from_s) + " s: " + event.name + " " + event.detail);
-        svg.line(x, y, x, y + 16, "");
-        if (x > free_from) {
-            std::string name = event.name;
-            std::replace(name.begin(), name.end(), '_', ' ');
-            const bool at_end = x > kWidth - 120;
-            svg.text(x + (at_end ? -4 : 4), y + 12, name,
-                     at_end ? "class=\"mark end\"" : "class=\"mark\"");
-            free_from = x + 8 + 6.5 * static_cast<double>(name.size());
+        svg.line(x, y, x, y + 10, "");
+        std::string name = event.name;
+        std::replace(name.begin(), name.end(), '_', ' ');
+        const double width = kLetter * static_cast<double>(name.size());
+        const double from = std::min(x - 1, kWidth - width);
+        for (int row = 0; row < 2; ++row) {
+            if (from < free_from[row]) continue;
+            svg.text(from, y + 22 + kRow * row, name, "class=\"mark\"");
+            free_from[row] = from + width + kGap;
+            break;
         }
         svg.close_group();
     }
@@ -207,7 +211,7 @@ std::string timeline_svg(const ReviewInput& input) {
     y += 26;
     svg.text(8, y + 12, "events", "class=\"name\"");
     add_events(input, axis, y, svg);
-    y += 30;
+    y += 48;
     const Lane lanes[] = {
         {"inserted length", "mm", &c.depth_mm, NAN, 10, false},
         {"tip to target", "mm, nearest", &c.tip_to_target_mm, pass_distance_mm(input.exercise), 10,
