@@ -14,7 +14,7 @@
 namespace sonocase::runtime::inline player_ui {
 namespace {
 
-constexpr float kRow = 28, kSmallBelow = 8;
+constexpr float kRow = 28, kSmallBelow = 8, kNeedleHigh = 44;
 
 const char* const kSteps[] = {"Find the target", "Bring the needle into the plane",
                               "Advance with the tip in view", "Stop in the middle"};
@@ -82,13 +82,11 @@ std::string hint_words(const TaskCardInput& input) {
                                      : input.texts.hints[input.hints_shown - 1];
 }
 
-float hint_head(const TaskCardInput& input) {
-    return shown_procedure(input) ? 30.0f : 44.0f;
-}
+constexpr float kHintHead = 30;
 
 float hint_height(const Ui& ui, float width, const TaskCardInput& input) {
     const std::string words = hint_words(input);
-    return hint_head(input) +
+    return kHintHead +
            (words.empty() ? 0 : ui.paragraph_height(width - 20, words, Type::small) + 10);
 }
 
@@ -345,10 +343,33 @@ float title_high(const Ui& ui, float width, const TaskCardInput& input) {
                     2 * ui.line_height(Type::heading) + 1);
 }
 
+// What the card of an attempt without a procedure shows below its head when it cuts nothing.
+float whole_task(const Ui& ui, float width, const TaskCardInput& input, bool described) {
+    const auto high = [&](const std::string& words, Type type) {
+        return ui.paragraph_height(width, words, type);
+    };
+    float sum = kNeedleHigh + 8 + kept_free(ui, width, input);
+    if (described) sum += high(input.texts.description, Type::small) + kSmallBelow;
+    if (input.exam) return sum + (input.mouse ? high(tr(kAllKeys), Type::small) + kSmallBelow : 0);
+    const int now = present_step(input);
+    sum += kTabsHigh + kTabsBelow + kTitleBelow +
+           high(tr(now < 4 ? kSteps[now] : "All targets reached"), Type::bold);
+    return sum + (input.mouse && now < 4 ? high(tr(kStepKeys[now]), Type::small) + kSmallBelow : 0);
+}
+
 // As much of the head as leaves room for the task and its hint, whole. room: above the button.
 Head head_of(const Ui& ui, const Box& room, const TaskCardInput& input) {
     constexpr float kLowCard = 300;  // question or tray of a procedure need all of it
-    if (!shown_procedure(input)) return {};
+    if (!shown_procedure(input)) {
+        if (!input.attempt || input.replays || input.guide) return {};
+        for (const bool described : {true, false}) {
+            const float left = room.h - whole_task(ui, room.w, input, described);
+            if (title_high(ui, room.w, input) + 4 + kAttemptHigh + kBelowAttempt <= left) return {};
+            if (kAttemptHigh + kBelowAttempt <= left) return {false, true};
+            if (left >= 0) return {false, false};
+        }
+        return {};
+    }
     if (room.h <= kLowCard) return {false, false, true};
     if (next_question(input.exercise.procedure, input.procedure->state, input.put_off) >= 0)
         return {};
@@ -472,12 +493,12 @@ void draw_standing(Ui& ui, Box& room, const TaskCardInput& input) {
 void draw_hints(
     Ui& ui, Box& room, const TaskCardInput& input, bool may_cut, TaskCardRequest& request) {
     const int count = static_cast<int>(input.texts.hints.size());
-    if (room.h < hint_head(input)) return;
+    if (room.h < kHintHead) return;
     const std::string words = hint_words(input);
     const float high = std::min(hint_height(ui, room.w, input), room.h);
     Box card = room.take_top(high, 8);
     ui.card(card, "hint", colour::kRaised);
-    Box head = card.take_top(hint_head(input));
+    Box head = card.take_top(kHintHead);
     ui.icon(Icon::hint, head.x + 10, head.y + 0.5f * head.h - 9, 18, colour::kDim);
     const int shown = std::min(input.hints_shown, count + 1);
     std::string line = shown == 0 ? filled(tr("%d hints"), count + 1)
@@ -614,7 +635,7 @@ TaskCardRequest draw_task_card(Ui& ui, const Box& card, const TaskCardInput& inp
     draw_head(ui, room, input, head);
     if (!input.replays && !shown_procedure(input) && room.h > 150 &&
         (input.mouse || !input.attempt)) {
-        Box links = room.take_bottom(44, 8);
+        Box links = room.take_bottom(kNeedleHigh, 8);
         ButtonStyle style;
         if (input.has_result && !input.attempt) {
             style.icon = Icon::review;
