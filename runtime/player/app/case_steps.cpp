@@ -272,7 +272,7 @@ void choose_preset(PlayerState& player,
 
 void adjust_gain(const ScanFrame& frame, ImageSettings& image) {
     if (frame.width_px <= 0 || frame.status != FrameStatus::rendered) return;
-    adjust_gain(frame.pixels, frame.width_px, frame.layout, frame.depth_mm, image);
+    adjust_gain(frame.pixels, frame.width_px, frame.layout, frame.depth_mm, frame.gain_law, image);
 }
 
 void check_bundle(CaseState& loaded, Notices& notices) {

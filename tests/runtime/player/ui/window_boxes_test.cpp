@@ -45,15 +45,16 @@ std::vector<SeenBox> load_boxes(const std::string& file) {
     return boxes;
 }
 
-const char* const kPages[] = {"scan",      "attempt", "frozen",  "after",     "replay",   "help",
-                              "tracker",   "effects", "cases",   "exercises", "setup",    "colour",
-                              "spectrum",  "motion",  "named",   "marks",     "settings", "notices",
-                              "class",     "sign_in", "longest", "question",  "asked",    "tray",
-                              "checklist", "course",  "module",  "locked",    "watched"};
+const char* const kPages[] = {
+    "scan",     "attempt",   "frozen", "after",   "replay",   "help",     "tracker", "effects",
+    "cases",    "exercises", "setup",  "colour",  "spectrum", "motion",   "named",   "marks",
+    "settings", "notices",   "class",  "sign_in", "longest",  "question", "asked",   "hinted",
+    "tray",     "checklist", "told",   "course",  "module",   "locked",   "watched"};
 
 // A procedure with as many acts as the tray has keys, long words, and a question.
 const char* const kProcedure = R"(name = "procedure"
 title = "A procedure with a long title that takes two lines of the card"
+hints = ["The vessel beside the target runs up the inner side of the flank, behind the straight muscle of the belly. Colour shows it."]
 [probe]
 shape = "linear"
 depth_mm = 60
@@ -98,6 +99,7 @@ options = ["Go on", "Wait until clotting is corrected or the way is another", "T
 answer = 1
 [texts.de]
 title = "Ein Ablauf mit einem langen Namen, der zwei Zeilen der Karte braucht"
+hints = ["Das Gefäß neben dem Ziel zieht an der Innenseite der Flanke hinter dem geraden Bauchmuskel nach oben. Die Farbe zeigt es."]
 [[texts.de.steps]]
 name = "numb"
 title = "Betäuben Sie den Weg bis zur Kapsel, mit allem, was dazu gehört"
@@ -117,6 +119,18 @@ needle_tip = [16, 0, 39]
 needle_direction = [-8, 0, -9]
 )";
 
+// The same without a question, and with as many acts as any scenario has: four rows of the tray.
+std::string plain_procedure() {
+    std::string toml = kProcedure;
+    const auto erase = [&](const char* from, const char* until) {
+        const auto begin = toml.find(from);
+        toml.erase(begin, toml.find(until, begin) - begin);
+    };
+    erase("[[items]]\nname = \"asked\"", "[texts.de]");
+    erase("[[steps]]\nname = \"wire\"", "[[steps]]\nname = \"catheter\"");
+    return toml.replace(toml.find("\"procedure\""), 11, "\"plain\"");
+}
+
 // The spectral mode with its gain at -30 dB, a number of two digits and a sign.
 std::string longest_values() {
     std::string keys = "key 3 shift\nwait 2\n";
@@ -128,15 +142,16 @@ std::string script(const std::string& folder) {
     const auto boxes = [&](const char* name) { return "boxes " + folder + "/" + name + "\n"; };
     return "only-shots\nwait 4\n" + boxes("scan") + "key f5\nwait 4\nkey b\nwait 4\n" +
            boxes("question") + "press later\nwait 2\npress ask\nwait 2\n" + boxes("asked") +
-           "press later\nkey j\nkey k\nkey l\nkey i\nkey i ctrl\nwait 4\n" + boxes("tray") +
-           "key b\nwait 8\n" + boxes("checklist") +
-           "key escape\nkey f5 shift\nwait 4\nkey b\nkey n\nhold w 6\nkey h\nwait 2\n" +
-           boxes("attempt") + "key space\nwait 2\n" + boxes("frozen") +
-           "key space\nwait 2\nkey b\nwait 3\n" + boxes("after") + "key p\nwait 2\n" +
-           boxes("replay") + "key p\nwait 2\nkey escape\n" + "key f1\nwait 2\n" + boxes("help") +
-           "key f1\nkey f9\nwait 2\n" + boxes("tracker") + "key f9\nkey f10\nwait 2\n" +
-           boxes("effects") + "key f10\nkey f8\nwait 2\n" + boxes("exercises") +
-           "press in_exam\npress marks\nwait 2\n" + boxes("marks") +
+           "press later\nwait 2\nkey h\nwait 3\n" + boxes("hinted") +
+           "key j\nkey k\nkey l\nkey i\nkey i ctrl\nwait 4\n" + boxes("tray") + "key b\nwait 8\n" +
+           boxes("checklist") + "key escape\nkey f5\nwait 4\nkey b\nwait 4\nkey h\nwait 3\n" +
+           boxes("told") + "key b\nwait 8\nkey escape\nkey f5 shift\nwait 4\n" +
+           "key f5 shift\nwait 4\nkey b\nkey n\nhold w 6\nkey h\nwait 2\n" + boxes("attempt") +
+           "key space\nwait 2\n" + boxes("frozen") + "key space\nwait 2\nkey b\nwait 3\n" +
+           boxes("after") + "key p\nwait 2\n" + boxes("replay") + "key p\nwait 2\nkey escape\n" +
+           "key f1\nwait 2\n" + boxes("help") + "key f1\nkey f9\nwait 2\n" + boxes("tracker") +
+           "key f9\nkey f10\nwait 2\n" + boxes("effects") + "key f10\nkey f8\nwait 2\n" +
+           boxes("exercises") + "press in_exam\npress marks\nwait 2\n" + boxes("marks") +
            "key escape\nkey f12\nwait 2\nkey f3\nwait 2\n" + boxes("setup") + "key f3\nhold u 6\n" +
            boxes("named") + "key 2 shift\nwait 6\n" + boxes("colour") + "key 3 shift\nwait 6\n" +
            boxes("spectrum") + "key 4 shift\nwait 6\n" + boxes("motion") + longest_values() +
@@ -267,6 +282,7 @@ class Tour {
         CaseBundle bundle = sonocase::testing::flowing_case();
         bundle.exercises[0].toml += kMarks;
         bundle.exercises.push_back({"procedure", kProcedure});
+        bundle.exercises.push_back({"plain", plain_procedure()});
         EXPECT_TRUE(save_bundle(bundle, place + "/cylinder.sonocase"));
         folder_.write("home/sonocase/player.json", R"({"sound": false})");
         folder_.write("home/course.toml", kCourse);
@@ -308,6 +324,10 @@ void Tour::check() {
             return std::any_of(boxes.begin(), boxes.end(),
                                [&](const SeenBox& b) { return b.name == name; });
         };
+        const auto begins = [&](const std::string& words) {
+            return std::any_of(boxes.begin(), boxes.end(),
+                               [&](const SeenBox& b) { return b.name.rfind(words, 0) == 0; });
+        };
         // The script came where it meant to.
         if (page == std::string("class")) {
             EXPECT_TRUE(has("csv") && has("Ann Onymous"));
@@ -343,6 +363,17 @@ void Tour::check() {
         }
         if (page == std::string("tray")) {
             EXPECT_TRUE(has("act0") && has("ask") && !has("option0"));
+        }
+        // Task and hint are whole: check_boxes() would have found them cut.
+        const bool english = language == "C";
+        if ((page == std::string("hinted") || page == std::string("told")) &&
+            width_px / used >= 1200) {
+            EXPECT_TRUE(has(english ? "Numb the way down to the capsule, with all that is needed"
+                                    : "Betäuben Sie den Weg bis zur Kapsel, mit allem, was dazu "
+                                      "gehört"));
+            EXPECT_TRUE(begins(english ? "The vessel beside" : "Das Gefäß neben"));
+            EXPECT_EQ(begins(english ? "Inject at least 5 ml" : "Mindestens 5 ml"),
+                      page == std::string("told") || height_px / used > 1000);
         }
         if (page == std::string("notices")) {
             EXPECT_TRUE(has("close") && !has("Help"));
