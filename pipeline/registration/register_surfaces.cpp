@@ -86,8 +86,8 @@ void warn_of_readings(StageReport& report, const FitContext& s, const FitMeasure
     if (off_skin) {
         report.warnings.push_back(
             text("%ld of %ld readings lie more than %.0f mm off the fitted skin, and not beyond "
-                 "its ends: if they are of a hand, a table or a sensor that was laid down, leave "
-                 "them out and fit again",
+                 "its ends: if they are of a hand or an arm, a table or a sensor that was laid "
+                 "down, leave them out and fit again",
                  fit.off_skin, fit.readings, kOffSkinMm));
     }
     if (fit.coverage < 0.5 && !off_skin) {

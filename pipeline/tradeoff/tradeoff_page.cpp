@@ -74,7 +74,9 @@ Chart suite_chart(const Suite& suite, const std::vector<Trial>& trials) {
         if (!shown || !std::isfinite(t.error)) continue;
         const auto own = t.role == TrialRole::paper ? std::array<std::uint8_t, 3>{213, 40, 0}
                                                     : marks[colour++ % marks.size()];
-        chart.series.push_back({t.name, {t.seconds}, {t.error}, SeriesStyle::points, own, 4.5});
+        // The standard is often a preset as well: it shows as a ring round it.
+        const double width = t.role == TrialRole::standard ? 7 : 4.5;
+        chart.series.push_back({t.name, {t.seconds}, {t.error}, SeriesStyle::points, own, width});
     }
     return chart;
 }
