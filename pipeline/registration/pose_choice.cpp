@@ -310,6 +310,7 @@ std::vector<JudgedPose> judge_without_open_side(const FitContext& s,
                                                 const Progress& progress) {
     given.hints.back.reset();
     rigid.starts = std::max(1, rigid.starts / kFewerStarts);
+    rigid.candidates = std::max(1, rigid.candidates / 2);
     std::vector<JudgedPose> judged = judge_candidates(s, s.target, given, field, rigid, progress);
     rank(judged);
     return judged;
