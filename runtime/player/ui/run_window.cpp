@@ -36,9 +36,7 @@ void ask_to_end(int) {
 }
 
 void apply_settings(const Settings& settings, ScanControls& controls) {
-    controls.settings.gain_db = settings.gain_db;
     controls.settings.dynamic_range_db = settings.dynamic_range_db;
-    for (std::size_t i = 0; i < 8; ++i) controls.settings.tgc_db[i] = settings.tgc_db[i];
 }
 
 void report(const Status& done) {
@@ -324,9 +322,7 @@ void PlayerWindow::show_picture(const PictureClock& clock) {
 void PlayerWindow::keep_settings() {
     const ScanControls& controls = scan_.console.controls;
     Settings& s = player_.settings;
-    s.gain_db = controls.settings.gain_db;
     s.dynamic_range_db = controls.settings.dynamic_range_db;
-    for (std::size_t i = 0; i < 8; ++i) s.tgc_db[i] = controls.settings.tgc_db[i];
     if (player_.arguments.tracker.empty()) s.tracker = scan_.tracker.spec;
     if (!player_.settings_file.empty()) report(save_settings(s, player_.settings_file));
 }
