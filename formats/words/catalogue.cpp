@@ -89,7 +89,7 @@ std::string Language::words(std::string_view english) const {
 }
 
 std::string Language::words(const Message& message) const {
-    if (catalogue.empty()) return message;
+    if (catalogue.empty()) return static_cast<const std::string&>(message);
     if (message.arguments().empty()) return words(message.format());
     std::vector<std::string> arguments;
     for (const Message& argument : message.arguments()) arguments.push_back(words(argument));
