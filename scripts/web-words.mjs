@@ -6,7 +6,7 @@ import {join} from 'node:path';
 
 const read = (...path) => readFileSync(join(...path), 'utf8');
 
-// {code, name, words: {english: other}} of the text of a .po file (runtime/player/words/po_text.h).
+// {code, name, words: {english: other}} of the text of a .po file (formats/words/catalogue.h).
 export function read_po(text) {
     const words = {};
     let key = null, of = null, entry = {};
@@ -59,7 +59,7 @@ function program_words(root) {
 
 // One for each language: {code, name, words, missing: what the page asks for and no catalogue has, twice: what both have}.
 export function page_catalogues(root) {
-    const page = join(root, 'runtime/web/page'), window_po = join(root, 'runtime/player/locale');
+    const page = join(root, 'runtime/web/page'), window_po = join(root, 'formats/words/locale');
     const asked = page_words(page), program = program_words(root);
     return readdirSync(window_po).filter((name) => name.endsWith('.po')).sort().map((name) => {
         const {code, name: called, words} = read_po(read(window_po, name)), own = read_po(read(page, 'locale', name)).words;

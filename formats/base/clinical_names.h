@@ -2,7 +2,7 @@
 
 // What a clinician calls the parts that a case's labels name. Segmentations name by rule
 // ("iliac_vena_right", "other_muscle_like"); the table says the words where the label's own are not
-// a clinician's. Other languages translate the words (runtime/player/words).
+// a clinician's. Other languages translate the words (formats/words).
 #pragma once
 
 #include <span>

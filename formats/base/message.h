@@ -27,7 +27,7 @@ inline std::string filled_in(std::string_view format, const std::vector<std::str
 }
 
 // The finished English text, which also keeps the format and the arguments that it was made of: a
-// catalogue of another language translates the format (runtime/player/words). A text without
+// catalogue of another language translates the format (formats/words). A text without
 // arguments is its own format. Not to be edited once made: a changed text no longer fits its
 // format.
 class Message : public std::string {

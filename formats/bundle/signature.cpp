@@ -106,8 +106,8 @@ struct SignatureCheck::State {
     // `next` is the first of `types` whose chunk has not been read to its end.
     std::size_t next = 0, at = 0;
     bool loaded = false;
-    std::vector<std::uint8_t> unpacked;
-    std::span<const std::uint8_t> content;
+    std::vector<std::uint8_t> unpacked = {};
+    std::span<const std::uint8_t> content = {};
     crypto_hash_sha512_state hash{};
 
     // False: the chunk cannot be read.

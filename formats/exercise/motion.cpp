@@ -121,11 +121,15 @@ BreathingField::BreathingField(const CaseBundle& bundle) {
 double BreathingField::weight(Point3 p) const {
     const Point3 v = grid_.voxel_from_point(p);
     double sum = 0;
-    const double fx = std::floor(v.x), fy = std::floor(v.y), fz = std::floor(v.z);
-    if (!(fx >= -1 && fy >= -1 && fz >= -1 && fx < grid_.size.x && fy < grid_.size.y &&
-          fz < grid_.size.z))
+    if (!(v.x >= -1 && v.y >= -1 && v.z >= -1 && v.x < grid_.size.x && v.y < grid_.size.y &&
+          v.z < grid_.size.z))
         return 0;
-    const int x = static_cast<int>(fx), y = static_cast<int>(fy), z = static_cast<int>(fz);
+    const auto below = [](double at) {  // std::floor() is a call
+        const int whole = static_cast<int>(at);
+        return whole - (whole > at ? 1 : 0);
+    };
+    const int x = below(v.x), y = below(v.y), z = below(v.z);
+    const double fx = x, fy = y, fz = z;
     const double across[2] = {1 - (v.x - fx), v.x - fx}, along[2] = {1 - (v.y - fy), v.y - fy},
                  up[2] = {1 - (v.z - fz), v.z - fz};
     const double share[4] = {across[0] * along[0], across[1] * along[0], across[0] * along[1],

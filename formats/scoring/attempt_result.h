@@ -2,7 +2,7 @@
 
 // What the page after an attempt says, in the window and in a browser: passed or not, five results
 // with what was needed, and one sentence on what to do differently. Words are English keys of the
-// catalogue (runtime/player/words/words.h).
+// catalogue (formats/words/catalogue.h).
 #pragma once
 
 #include <string>

@@ -1053,4 +1053,13 @@ const char* step_state_name(StepState state) {
     return kNames[static_cast<std::size_t>(state)];
 }
 
+const char* missed_words(std::string_view why) {
+    return why == "too_early"      ? "Too early"
+           : why == "too_late"     ? "Too late"
+           : why == "happened"     ? "It happened"
+           : why == "wrong_answer" ? "Answered wrongly"
+           : why == "not_answered" ? "Not answered"
+                                   : "Not done";
+}
+
 }  // namespace sonocase

@@ -42,6 +42,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "formats/exercise/exercise.h"
@@ -166,6 +167,9 @@ struct ProcedureResult {
     int stray_acts = 0, stray_acts_at_most = 0;
     bool passed = true;  // all critical items, the cut, and no more stray acts than allowed
 };
+
+// Why an item is not ticked (Item::why), for people: "Too early".
+const char* missed_words(std::string_view why);
 
 class ProcedureRun {
   public:

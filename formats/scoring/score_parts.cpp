@@ -146,7 +146,7 @@ void score_motion(const std::string& tool,
 void score_tissue(const ScoreInput& input,
                   bool has_no_go,
                   MetricValues& values,
-                  std::vector<std::string>& warnings) {
+                  std::vector<Message>& warnings) {
     double axial = 0;
     for (std::size_t i = 1; i < input.readings.size(); ++i) {
         axial += std::abs(dot(input.tip(i) - input.tip(i - 1), input.direction(i)));

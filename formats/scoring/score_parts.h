@@ -79,7 +79,7 @@ void score_motion(const std::string& tool,
 void score_tissue(const ScoreInput& input,
                   bool has_no_go,
                   MetricValues& values,
-                  std::vector<std::string>& warnings);
+                  std::vector<Message>& warnings);
 std::vector<InsertionScore> find_insertions(const ScoreInput& input);
 
 // Part 4. `scores` has one entry per target of the exercise.

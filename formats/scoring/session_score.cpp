@@ -20,9 +20,7 @@ using detail::ScoreInput;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-void score_times(const ScoreInput& input,
-                 MetricValues& values,
-                 std::vector<std::string>& warnings) {
+void score_times(const ScoreInput& input, MetricValues& values, std::vector<Message>& warnings) {
     double first = INFINITY, last = -INFINITY;
     for (const ToolTrack* track : {&input.probe, &input.needle}) {
         if (track->points.empty()) continue;
@@ -33,9 +31,10 @@ void score_times(const ScoreInput& input,
     if (!input.needle.points.empty()) values["tracking_gap_s"] = input.needle.longest_gap_s;
     const std::size_t back = input.probe.run_back + input.needle.run_back;
     if (back > 0) {
-        warnings.push_back(std::to_string(back) +
-                           " readings were left out, because their time ran backwards or their "
-                           "pose was not finite.");
+        warnings.push_back(
+            {"{} readings were left out, because their time ran backwards or their "
+             "pose was not finite.",
+             {std::to_string(back)}});
     }
     if (!input.anatomy)
         warnings.push_back("No body was given, so scores that need one are undefined.");
@@ -234,7 +233,7 @@ std::string score_json(const SessionScore& score, const Exercise& exercise) {
         targets.push_back(std::move(item));
     }
     out["targets"] = std::move(targets);
-    out["warnings"] = score.warnings;
+    out["warnings"] = std::vector<std::string>(score.warnings.begin(), score.warnings.end());
     if (score.procedure) out["procedure"] = procedure_json(*score.procedure);
     return detail::json_text(out, true) + "\n";
 }

@@ -71,7 +71,7 @@ struct SessionScore {
     std::optional<ProcedureResult> procedure;  // where the exercise has one
     bool passed = true;  // all pass marks, and the procedure; true without any
     SessionCurves curves;
-    std::vector<std::string> warnings;          // whole sentences
+    std::vector<Message> warnings;              // whole sentences
     double value(std::string_view name) const;  // NaN if absent
 };
 

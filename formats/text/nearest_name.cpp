@@ -45,7 +45,9 @@ std::string suggest_name(std::string_view name, std::span<const std::string> can
     std::string list = "valid here: ";
     for (std::size_t i = 0; i < candidates.size(); ++i) {
         if (i > 0) list += ", ";
-        list += candidates[i];
+        // A title with a comma in it would read as two names.
+        const bool quoted = candidates[i].find(',') != std::string::npos;
+        list += quoted ? "'" + candidates[i] + "'" : candidates[i];
     }
     return list;
 }

@@ -37,18 +37,19 @@ struct BrickVolume {
     std::vector<T> uniform;          // distinct values of uniform bricks
     RawVector<T> pool;               // 64 values per stored brick
 
+    // i, j, k: inside. Unsigned: a division by the edge is a shift then.
     T at(int i, int j, int k) const {
-        const Int3 n = brick_count(size);
+        constexpr unsigned kEdge = kBrickEdge;
+        const auto x = static_cast<unsigned>(i), y = static_cast<unsigned>(j),
+                   z = static_cast<unsigned>(k);
+        const auto along = [](int n) { return (static_cast<unsigned>(n) + kEdge - 1) / kEdge; };
         const std::size_t brick =
-            static_cast<std::size_t>(i / kBrickEdge) +
-            static_cast<std::size_t>(n.x) *
-                (static_cast<std::size_t>(j / kBrickEdge) +
-                 static_cast<std::size_t>(n.y) * static_cast<std::size_t>(k / kBrickEdge));
+            x / kEdge +
+            std::size_t{along(size.x)} * (y / kEdge + std::size_t{along(size.y)} * (z / kEdge));
         const std::uint32_t entry = table[brick];
         if (entry & kUniformBrick) return uniform[entry & ~kUniformBrick];
         return pool[static_cast<std::size_t>(entry) * kBrickVoxels +
-                    static_cast<std::size_t>((i % kBrickEdge) + kBrickEdge * (j % kBrickEdge) +
-                                             kBrickEdge * kBrickEdge * (k % kBrickEdge))];
+                    (x % kEdge + kEdge * (y % kEdge) + kEdge * kEdge * (z % kEdge))];
     }
 };
 

@@ -13,6 +13,7 @@
 #include <set>
 #include <tuple>
 
+#include "formats/text/excerpt.h"
 #include "pipeline/anatomy/label_facts.h"
 #include "pipeline/anatomy/label_table.h"
 #include "pipeline/anatomy/torso_model.h"
@@ -758,16 +759,13 @@ class Check {
     }
 
     std::string exchanged_names() const {
-        std::string list;
-        int count = 0;
+        std::vector<std::string> list;
         for (std::size_t i = 0; i < seen_.size(); ++i) {
             const ModelStructure* s = best_.names[i];
-            if (s == names_[i] || s == nullptr) continue;
-            if (++count <= 4)
-                list += (count > 1 ? ", '" : "'") + seen_[i].label->name + "' is like " + s->name;
+            if (s != names_[i] && s != nullptr)
+                list.push_back("'" + seen_[i].label->name + "' is like " + s->name);
         }
-        if (count > 4) list += " and " + std::to_string(count - 4) + " more";
-        return list;
+        return excerpt(list);
     }
 
     AnatomyFinding finding() const {
@@ -867,8 +865,7 @@ class Check {
 
     // Volumes that nobody has. Cut organs count where they are too large.
     void volumes(AnatomyReport& report) const {
-        std::string large, small;
-        int too_large = 0, too_small = 0;
+        std::vector<std::string> large, small;
         bool far = false;
         for (std::size_t i = 0; i < seen_.size(); ++i) {
             const double ml = seen_[i].label->ml;
@@ -876,12 +873,12 @@ class Check {
                 text(ml < 10 ? "%s of %.2g ml" : "%s of %.0f ml", seen_[i].label->name.c_str(), ml);
             if (ml > names_[i]->max_ml) {
                 far = far || ml > 2 * names_[i]->max_ml;
-                if (++too_large <= 3) large += (too_large > 1 ? ", " : "") + one;
+                large.push_back(one);
             }
-            if (!seen_[i].cut && ml < names_[i]->min_ml)
-                if (++too_small <= 3) small += (too_small > 1 ? ", " : "") + one;
+            if (!seen_[i].cut && ml < names_[i]->min_ml) small.push_back(one);
         }
-        const bool impossible = far || too_large >= 2;
+        const bool impossible = far || large.size() >= 2;
+        const int too_small = static_cast<int>(small.size());
         AnatomyFinding* unit = nullptr;
         for (AnatomyFinding& f : report.findings)
             if (f.cause == AnatomyCause::unit || f.cause == AnatomyCause::spacing) unit = &f;
@@ -889,18 +886,18 @@ class Check {
             unit->error = impossible || 2 * too_small > known();
             return;
         }
-        if (too_large > 0) {
+        if (!large.empty()) {
             AnatomyFinding f;
             f.cause = AnatomyCause::volumes;
             f.error = impossible;
-            f.text = "larger than in any body: " + large +
+            f.text = "larger than in any body: " + excerpt(large) +
                      "; the names are another table's, or the unit is wrong: give the --table that "
                      "belongs to the map, --names none, or --scale";
             report.findings.push_back(f);
         } else if (3 * too_small > known() && too_small >= 2) {
             AnatomyFinding f;
             f.cause = AnatomyCause::volumes;
-            f.text = "these are smaller than in a newborn: " + small +
+            f.text = "these are smaller than in a newborn: " + excerpt(small) +
                      "; check names and unit, --table and --scale";
             report.findings.push_back(f);
         }

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "formats/exercise/exercise.h"
+#include "formats/text/excerpt.h"
 #include "formats/text/json_reader.h"
 #include "formats/text/nearest_name.h"
 #include "pipeline/anatomy/anatomy_check.h"
@@ -147,17 +148,14 @@ class Anatomy {
         const Vector3 right = cross(forwards, up);
         result_.forwards = forwards;
         result_.up = up;
-        constexpr int kNamedPairs = 4;
-        int agree = 0, against = 0;
-        std::string swapped;
+        int agree = 0;
+        std::vector<std::string> swapped;
         const auto compare = [&](std::optional<Vector3> r, std::optional<Vector3> l,
                                  const std::string& name) {
             if (!r || !l) return;
             const double off = dot(*r - *l, right) * labels_.voxel_mm();
             if (off > 10) ++agree;
-            if (off < -10) {
-                if (++against <= kNamedPairs) swapped += (swapped.empty() ? "" : ", ") + name;
-            }
+            if (off < -10) swapped.push_back(name);
         };
         compare(middle({"liver"}), middle({"spleen"}), "liver and spleen");
         for (const Label& label : bundle_.labels) {
@@ -169,13 +167,11 @@ class Anatomy {
             if (l < 0 || sums_.count[l] == 0 || sums_.count[r] == 0) continue;
             compare(sums_.middle[r], sums_.middle[l], label.name);
         }
-        if (against > 0)
-            result_.faults.push_back(
-                {"sides-swapped",
-                 "right and left are exchanged: " + swapped +
-                     (against > kNamedPairs ? text(" and %d more", against - kNamedPairs) : "") +
-                     (agree > 0 ? " (others are right)" : ""),
-                 "check the label map's axes and the names of its values"});
+        if (!swapped.empty())
+            result_.faults.push_back({"sides-swapped",
+                                      "right and left are exchanged: " + excerpt(swapped) +
+                                          (agree > 0 ? " (others are right)" : ""),
+                                      "check the label map's axes and the names of its values"});
     }
 
     void units() {

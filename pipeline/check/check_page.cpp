@@ -24,6 +24,7 @@ extern const std::string_view kCheckPageHtml;  // check_page.html, embedded by C
 namespace {
 
 constexpr double kAmbient = 0.25;
+constexpr std::size_t kShownPlaces = 12;  // a longer list of structures is folded up
 
 // The labels that are drawn: everything but the covers of the body.
 std::vector<std::uint8_t> seen_labels(const CaseLabels& labels) {
@@ -230,7 +231,7 @@ const Step& step_of(double mm) {
 
 // Planes coloured by how far from its place each structure may lie, and the figures.
 std::string unknown_part(const CaseBundle& bundle) {
-    const std::vector<UnknownPlace> places = unknown_places(bundle.manifest.stages);
+    const std::vector<UnknownPlace> places = unknown_places_of_case(bundle);
     if (places.empty()) return "";
     Colours colours(bundle.labels.size(), {150, 150, 150});  // a structure of later stages
     colours[0] = {255, 255, 255};
@@ -240,7 +241,7 @@ std::string unknown_part(const CaseBundle& bundle) {
             if (bundle.labels[l].name == place.label) colours[l] = step_of(place.p90_mm).colour;
         rows += html().filled(
             "unknown_row",
-            {{"label", escaped_html(place.label)},
+            {{"label", escaped_html(place.label + (place.target ? " (has a target)" : ""))},
              {"mm", number(place.p90_mm)},
              {"held", place.with_landmarks_mm > 0 ? number(place.with_landmarks_mm) : ""}});
     }
@@ -250,10 +251,12 @@ std::string unknown_part(const CaseBundle& bundle) {
                                  "," + std::to_string(step.colour[2])},
                      {"words", step.words}});
     std::string advice = landmark_advice(places);
-    if (!advice.empty()) advice[0] = static_cast<char>(std::toupper(advice[0]));
+    if (!advice.empty()) advice[0] = static_cast<char>(std::toupper(advice[0])), advice += ".";
     return html().filled("unknown", {{"planes", planes(bundle, colours, Borders::drawn)},
                                      {"legend", legend},
                                      {"advice", escaped_html(advice)},
+                                     {"open", places.size() <= kShownPlaces ? " open" : ""},
+                                     {"count", std::to_string(places.size())},
                                      {"rows", rows}});
 }
 
@@ -262,7 +265,7 @@ std::string accuracy_part(const CaseBundle& bundle, const std::vector<CasePoint>
     const CaseAccuracy accuracy = case_accuracy(bundle, points);
     if (accuracy.budget.entries.empty()) return "";
     return html().filled("accuracy", {{"svg", accuracy_svg(accuracy)},
-                                      {"known", number_text(accuracy.budget.known_mm, 3)}});
+                                      {"summary", escaped_html(accuracy_summary(accuracy))}});
 }
 
 std::string faults_part(const CheckResult& result) {
@@ -275,8 +278,14 @@ std::string faults_part(const CheckResult& result) {
     return html().filled("faults", {{"rows", rows}});
 }
 
-std::string target_rows(const CheckResult& result) {
+std::string target_rows(const CaseBundle& bundle, const CheckResult& result) {
     std::string rows;
+    const std::vector<UnknownPlace> places = unknown_places(bundle.manifest.stages);
+    const auto within = [&](const std::string& label) {
+        for (const UnknownPlace& place : places)
+            if (place.label == label) return number(place.p90_mm);
+        return std::string();
+    };
     for (const TargetRow& t : result.targets)
         rows += html().filled("target", {{"exercise", escaped_html(t.exercise)},
                                          {"target", escaped_html(t.target)},
@@ -284,7 +293,8 @@ std::string target_rows(const CheckResult& result) {
                                          {"depth", number(t.depth_mm)},
                                          {"blocked", number(100 * t.blocked)},
                                          {"needle", t.needle ? "yes" : "no"},
-                                         {"visible", number(100 * t.visible)}});
+                                         {"visible", number(100 * t.visible)},
+                                         {"within", within(t.inside)}});
     return rows;
 }
 
@@ -339,7 +349,7 @@ std::string check_page(const CaseBundle& bundle,
          {"views", views(bundle, result)},
          {"ribs_right", std::to_string(result.ribs_right)},
          {"ribs_left", std::to_string(result.ribs_left)},
-         {"targets", target_rows(result)},
+         {"targets", target_rows(bundle, result)},
          {"exercises", exercise_rows(result)},
          {"organs", organ_rows(result)},
          {"remarks", remarks},

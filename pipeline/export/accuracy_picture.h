@@ -16,14 +16,17 @@ namespace sonocase::pipeline::inline exporting {
 struct CaseAccuracy {
     std::string case_name;
     ErrorBudget budget;
-    std::vector<UnknownPlace> places;  // worst first
+    std::vector<UnknownPlace> places;  // of unknown_places_of_case()
     std::vector<CasePoint> points;     // by seconds
 };
 
 // points  of case_points() (pipeline/tradeoff/choose_settings.h)
 CaseAccuracy case_accuracy(const CaseBundle& bundle, std::vector<CasePoint> points);
 
-// Bars of letters, as wide as a terminal.
+// How far off the case is, what most of that is, and what would lower it: two or three sentences.
+std::string accuracy_summary(const CaseAccuracy& accuracy);
+
+// The summary, and bars of letters as wide as a terminal.
 std::string accuracy_text(const CaseAccuracy& accuracy);
 
 std::string accuracy_svg(const CaseAccuracy& accuracy);

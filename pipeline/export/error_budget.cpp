@@ -8,6 +8,7 @@
 #include <optional>
 #include <string_view>
 
+#include "formats/exercise/exercise.h"
 #include "pipeline/base/text.h"
 
 namespace sonocase::pipeline::inline exporting {
@@ -79,13 +80,29 @@ std::vector<UnknownPlace> unknown_places(std::span<const StageReport> stages) {
     return places;
 }
 
+std::vector<UnknownPlace> unknown_places_of_case(const CaseBundle& bundle) {
+    std::vector<UnknownPlace> places = unknown_places(bundle.manifest.stages);
+    for (const EmbeddedExercise& embedded : bundle.exercises) {
+        const auto exercise = parse_exercise(embedded.toml, embedded.name);
+        if (!exercise) continue;
+        for (const Target& target : exercise->targets)
+            for (UnknownPlace& place : places)
+                if (place.label == target.inside) place.target = true;
+    }
+    std::stable_partition(places.begin(), places.end(),
+                          [](const UnknownPlace& place) { return place.target; });
+    return places;
+}
+
 std::string landmark_advice(std::span<const UnknownPlace> places) {
     const UnknownPlace* most = nullptr;
     const auto gain = [](const UnknownPlace& p) { return p.p90_mm - p.with_landmarks_mm; };
     for (const UnknownPlace& place : places) {
         if (!(place.with_landmarks_mm > 0) || place.with_landmarks_mm > 0.9 * place.p90_mm)
             continue;
-        if (most == nullptr || gain(place) > gain(*most)) most = &place;
+        if (most == nullptr || place.target > most->target ||
+            (place.target == most->target && gain(place) > gain(*most)))
+            most = &place;
     }
     if (most == nullptr) return "";
     return text("two landmarks far apart would bring %s from %.1f to %.1f mm", most->label.c_str(),

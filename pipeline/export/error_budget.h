@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "formats/base/stage_report.h"
+#include "formats/bundle/case_bundle.h"
 
 namespace sonocase::pipeline::inline exporting {
 
@@ -49,13 +50,17 @@ struct UnknownPlace {
     std::string label;
     double p90_mm = 0;             // nine times in ten it lies nearer
     double with_landmarks_mm = 0;  // the same if two landmarks were given; 0: that is not known
+    bool target = false;           // a target of an exercise lies in it
 };
 
 // Worst first; empty where the case's map was not fitted.
 std::vector<UnknownPlace> unknown_places(std::span<const StageReport> stages);
 
-// "two landmarks far apart would bring liver from 11 to 3 mm": the structure that they help most.
-// Empty where they bring none nearer by a tenth.
+// Those in which a target lies before the others, either worst first.
+std::vector<UnknownPlace> unknown_places_of_case(const CaseBundle& bundle);
+
+// "two landmarks far apart would bring liver from 11 to 3 mm": the structure that they help most,
+// with a target where they help one of those. Empty where they bring none nearer by a tenth.
 std::string landmark_advice(std::span<const UnknownPlace> places);
 
 // An entry is left out where its stage did not report what it is computed from.

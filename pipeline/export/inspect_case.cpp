@@ -93,17 +93,21 @@ std::string budget_text(const ErrorBudget& budget, const NextStep& next) {
     return text;
 }
 
-// The structures whose place on the mannequin is known least.
-std::string unknown_text(std::span<const StageReport> stages) {
-    const std::vector<UnknownPlace> places = unknown_places(stages);
+// How far from their places the structures with targets, and those that are known least, may lie.
+std::string unknown_text(const CaseBundle& bundle) {
+    const std::vector<UnknownPlace> places = unknown_places_of_case(bundle);
     if (places.empty()) return "";
     std::string text =
         "\nplace of the structures, by what the readings leave open if the patient lies as fitted: "
         "nine times in ten within\n";
-    for (std::size_t n = 0; n < std::min<std::size_t>(5, places.size()); ++n)
-        text += line("  %-32s %6.1f mm", places[n].label.c_str(), places[n].p90_mm);
-    if (places.size() > 5)
-        text += line("  the other %zu within %.1f mm", places.size() - 5, places[5].p90_mm);
+    const auto targets = static_cast<std::size_t>(std::count_if(
+        places.begin(), places.end(), [](const UnknownPlace& place) { return place.target; }));
+    const std::size_t shown = std::min(targets + 5, places.size());
+    for (std::size_t n = 0; n < shown; ++n)
+        text += line("  %-32s %6.1f mm%s", places[n].label.c_str(), places[n].p90_mm,
+                     places[n].target ? "  has a target" : "");
+    if (places.size() > shown)
+        text += line("  the other %zu within %.1f mm", places.size() - shown, places[shown].p90_mm);
     if (const std::string advice = landmark_advice(places); !advice.empty())
         text += "  " + advice + "\n";
     return text;
@@ -387,7 +391,7 @@ std::string inspection_text(const CaseBundle& bundle, const Inspection& inspecti
     else
         text += "  (seconds stand in BUNDLE.report.json, which is not beside this bundle)\n";
     text += budget_text(error_budget(bundle.manifest.stages), inspection.next);
-    text += unknown_text(bundle.manifest.stages);
+    text += unknown_text(bundle);
     text += "\nexercises\n";
     for (const EmbeddedExercise& embedded : bundle.exercises) {
         const auto exercise = parse_exercise(embedded.toml, embedded.name);

@@ -13,6 +13,7 @@
 #include "formats/files/atomic_file.h"
 #include "formats/files/load_save.h"
 #include "formats/files/thread_jobs.h"
+#include "formats/text/excerpt.h"
 #include "pipeline/anatomy/anatomy_check.h"
 #include "pipeline/base/text.h"
 #include "pipeline/check/check_case.h"
@@ -76,19 +77,17 @@ double covered_share(const LabelVolume& labels) {
     return faces == 0 ? 0 : static_cast<double>(covered) / static_cast<double>(faces);
 }
 
-// "'Leber', 'Milz' and 3 more": names that no structure here has. What the scan fills in counts as
+// Names that no structure here has. What the scan fills in counts as
 // none.
 std::string unknown_names(const std::vector<Label>& labels) {
-    constexpr int kNamed = 4;
-    std::string names;
-    int count = 0;
+    std::vector<std::string> names;
     for (const Label& label : labels) {
         if (label.tissue == "outside" || is_known_structure(label.name) || label.name == "skin" ||
             label.name == "gas_in_body" || label.name.starts_with("other_"))
             continue;
-        if (++count <= kNamed) names += (count == 1 ? "'" : ", '") + label.name + "'";
+        names.push_back("'" + label.name + "'");
     }
-    return count > kNamed ? names + text(" and %d more", count - kNamed) : names;
+    return excerpt(names);
 }
 
 class Maker {

@@ -22,7 +22,9 @@ std::string escaped_html(std::string_view text) {
     return out;
 }
 
-HtmlTemplate::HtmlTemplate(std::string_view html) {
+HtmlTemplate::HtmlTemplate(std::string_view html,
+                           std::function<std::string(std::string_view)> words)
+    : words_(std::move(words)) {
     constexpr std::string_view kBegin = "<!--begin:", kTail = "-->";
     for (std::size_t at = 0; (at = html.find(kBegin, at)) != std::string_view::npos;) {
         const std::size_t name_at = at + kBegin.size(), name_end = html.find(kTail, name_at);
@@ -49,11 +51,16 @@ std::string HtmlTemplate::filled(std::string_view block, HtmlValues values) cons
         const std::size_t close = text.find("}}", open);
         assert(close != std::string_view::npos);
         const std::string_view key = text.substr(open + 2, close - open - 2);
+        at = close + 2;
+        if (key.starts_with('_')) {
+            const std::string_view english = key.substr(1);
+            out += escaped_html(words_ ? words_(english) : std::string(english));
+            continue;
+        }
         const auto value = std::find_if(values.begin(), values.end(),
                                         [&](const auto& pair) { return pair.first == key; });
         assert(value != values.end());
         out += value->second;
-        at = close + 2;
     }
 }
 

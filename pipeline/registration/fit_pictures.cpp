@@ -121,8 +121,10 @@ Status views(const Scene& scene, const std::string& path, double limit) {
     const struct {
         const char* name;
         Vector3 from;
-    } sides[] = {
-        {"front", {0, 1, 0}}, {"back", {0, -1, 0}}, {"right", {1, 0, 0}}, {"left", {-1, 0, 0}}};
+    } sides[] = {{"front (red: the patient stands out)", {0, 1, 0}},
+                 {"back (blue: he lies inside)", {0, -1, 0}},
+                 {"right (white: both skins meet)", {1, 0, 0}},
+                 {"left (grey: no reading near)", {-1, 0, 0}}};
     vtkNew<vtkRenderer> renderers[4];
     for (int n = 0; n < 4; ++n) {
         vtkRenderer* renderer = renderers[n];
@@ -201,14 +203,16 @@ Status cuts(const Scene& scene, const std::string& path) {
     const struct {
         const char* name;
         Vector3 normal, from, up;
-    } planes[] = {{"axial: red patient, blue mannequin", {0, 0, 1}, {0, 0, -1}, {0, 1, 0}},
-                  {"coronal", {0, 1, 0}, {0, 1, 0}, {0, 0, 1}},
-                  {"sagittal", {1, 0, 0}, {1, 0, 0}, {0, 0, 1}}};
+    } planes[] = {
+        {"axial, from the feet (red: patient, blue: readings)", {0, 0, 1}, {0, 0, -1}, {0, 1, 0}},
+        {"coronal, from the front", {0, 1, 0}, {0, 1, 0}, {0, 0, 1}},
+        {"sagittal, from the right", {1, 0, 0}, {1, 0, 0}, {0, 0, 1}}};
     vtkNew<vtkRenderer> renderers[3];
     for (int n = 0; n < 3; ++n) {
         vtkRenderer* renderer = renderers[n];
         renderer->SetViewport(n / 3.0, 0, (n + 1) / 3.0, 1);
-        renderer->SetBackground(0.98, 0.98, 0.98);
+        const double grey = n % 2 == 0 ? 0.98 : 0.94;  // tells the panels apart
+        renderer->SetBackground(grey, grey, grey);
         add_cut(renderer, scene.mannequin, scene.box.centre(), planes[n].normal, mannequin);
         add_cut(renderer, scene.skin, scene.box.centre(), planes[n].normal, patient);
         aim_camera(renderer, scene.box, planes[n].from, planes[n].up, 1600 / 3.0 / 560);

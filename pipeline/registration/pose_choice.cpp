@@ -15,7 +15,7 @@ namespace {
 // Candidates are compared after a quadratic of this stiffness, by gaps with this Cauchy scale; a
 // point without a counterpart costs as much as this gap.
 constexpr double kJudgeConstraintMm = 10, kJudgeScaleMm = 5, kNoCounterpartMm = 12;
-constexpr double kCloseScore = 1.10, kQuarterTurn = 1.25;
+constexpr double kCloseScore = 1.10, kQuarterTurn = 1.25, kQuarterTurnCosine = 0.7;
 // Bodies whose skin has no right and left fit their mirror image within 3 % either way; those whose
 // skin has fit it 15 % worse or more. Halves and quarters of right-handed bodies fit 4 % better to
 // 18 % worse in the mirror, and of left-handed ones 10 % better to 19 % worse.
@@ -34,6 +34,10 @@ constexpr double kFrontScore = 1.2;
 constexpr double kEqualScore = 1.04;
 // Poses that reach fewer readings are not told apart by how close the rest of them lie.
 constexpr double kJudgedCoverage = 0.5;
+// Of less of the skin than this, the side that the sweep is open to may as well be a flank. In
+// windows of a front, poses that follow it fit at most 5 % worse than poses that are rolled away
+// from it, in strips of a flank 24 % worse or more.
+constexpr double kLittleSkin = 0.45, kFlankScore = 1.15;
 constexpr int kFewerStarts = 3;   // the head the other way is looked for with a third of the starts
 constexpr int kMoreSearches = 2;  // with twice the starts each, while only one start found the best
 
@@ -158,8 +162,8 @@ bool drop_open_side(const FitContext& s,
     const auto front = [](const JudgedPose& p) {
         return p.rigid.target_from_skin.rotation.column(1);
     };
-    const bool followed = std::abs(dot(front(*with), *s.hints.back)) > 0.7;
-    const bool turned = std::abs(dot(front(*with), front(*without))) < 0.7;
+    const bool followed = std::abs(dot(front(*with), *s.hints.back)) > kQuarterTurnCosine;
+    const bool turned = std::abs(dot(front(*with), front(*without))) < kQuarterTurnCosine;
     if (followed && (!turned || bare_mm(*with) < kQuarterTurn * bare_mm(*without))) return false;
     for (JudgedPose& p : judged) {
         const double rigid = p.rigid.score_mm;
@@ -298,6 +302,38 @@ void rank(std::vector<JudgedPose>& judged) {
     std::rotate(judged.begin(), at, at + 1);
 }
 
+// Candidates of a smaller search that does not know of the open side, best first.
+std::vector<JudgedPose> judge_without_open_side(const FitContext& s,
+                                                Given given,
+                                                const SplinePenalty& field,
+                                                RigidOptions rigid,
+                                                const Progress& progress) {
+    given.hints.back.reset();
+    rigid.starts = std::max(1, rigid.starts / kFewerStarts);
+    rigid.candidates = std::max(1, rigid.candidates / 2);
+    std::vector<JudgedPose> judged = judge_candidates(s, s.target, given, field, rigid, progress);
+    rank(judged);
+    return judged;
+}
+
+// Whether a strip of skin lies clearly better when it is rolled away from the side that it is open
+// to. That side pulls all candidates, so that they alone do not tell.
+bool is_strip_of_flank(const FitContext& s,
+                       const RegisterOptions& options,
+                       const Given& given,
+                       const SplinePenalty& field,
+                       const JudgedPose& best,
+                       const Progress& progress) {
+    if (!given.hints.back || options.open_side != "auto" || s.target.table.found ||
+        best.skin_coverage >= kLittleSkin)
+        return false;
+    const JudgedPose other =
+        judge_without_open_side(s, given, field, options.rigid, progress).front();
+    const Vector3 front = other.rigid.target_from_skin.rotation.column(1);
+    return std::abs(dot(front, *given.hints.back)) < kQuarterTurnCosine &&
+           best.score_mm > kFlankScore * other.score_mm;
+}
+
 // What the scores of a pose and of its opposite tell.
 enum class Verdict { right, wrong, untold };
 Verdict verdict_of(double here_mm, double opposite_mm, double margin) {
@@ -367,7 +403,7 @@ void check_hands(const FitContext& s,
 void check_head(const FitContext& s,
                 const Given& given,
                 const SplinePenalty& field,
-                RigidOptions rigid,
+                const RigidOptions& options,
                 const Progress& progress,
                 PoseChoice* choice) {
     if (!given.hints.up) {
@@ -381,6 +417,7 @@ void check_head(const FitContext& s,
     }
     Given turned = given;
     turned.hints.up = -*given.hints.up;
+    RigidOptions rigid = options;
     rigid.starts = std::max(1, rigid.starts / kFewerStarts);
     double score = INFINITY, rigid_score = INFINITY;
     for (const JudgedPose& p : judge_candidates(s, s.target, turned, field, rigid, progress)) {
@@ -388,16 +425,27 @@ void check_head(const FitContext& s,
         score = p.score_mm;
         rigid_score = p.rigid.score_mm;
     }
-    choice->turned_score_mm = score;
     const double best = choice->best.score_mm, rigid_best = choice->best.rigid.score_mm;
+    Verdict verdict = verdict_of(best, score, margin_of(choice->best, kOppositeScore));
+    if (verdict == Verdict::right && choice->best.skin_coverage < kLittleSkin && given.hints.back) {
+        // Not while it follows the open side, which may be a flank's.
+        const JudgedPose other =
+            judge_without_open_side(s, turned, field, options, progress).front();
+        if (other.score_mm < score) {
+            score = other.score_mm;
+            rigid_score = other.rigid.score_mm;
+        }
+        if (verdict_of(best, score, kOppositeScoreOfPart) != Verdict::right)
+            verdict = Verdict::untold;
+    }
+    choice->turned_score_mm = score;
+    if (verdict == Verdict::untold && choice->best.skin_coverage >= kWholeCoverage &&
+        best * rigid_best > kOppositeBothWays * score * rigid_score)
+        verdict = Verdict::wrong;
     const std::string scores = text(
         "fits to %.2f mm the other way and to %.2f mm as given (%.2f and %.2f mm before the "
         "warp)",
         score, best, rigid_score, rigid_best);
-    Verdict verdict = verdict_of(best, score, margin_of(choice->best, kOppositeScore));
-    if (verdict == Verdict::untold && choice->best.skin_coverage >= kWholeCoverage &&
-        best * rigid_best > kOppositeBothWays * score * rigid_score)
-        verdict = Verdict::wrong;
     if (verdict == Verdict::wrong) {
         choice->head = "wrong: it " + scores;
         choice->warnings.push_back("the head direction seems to point to the feet: the skin " +
@@ -412,7 +460,8 @@ void check_head(const FitContext& s,
     }
 }
 
-// The patient the other way round, front to back, about the middle of the readings.
+// The patient the other way round, front to back, about the middle of the readings. What the open
+// side costs either way is left out: it is what is to be told.
 void check_front(const FitContext& s,
                  const Given& given,
                  const SplinePenalty& field,
@@ -430,14 +479,18 @@ void check_front(const FitContext& s,
     const Matrix3& turn = best.rigid.target_from_skin.rotation;
     const Matrix3 half = Matrix3::from_columns(-turn.column(0), -turn.column(1), turn.column(2));
     // x -> middle + half (turn^T (x - middle)) after the pose.
-    const Vector3 from = best.rigid.target_from_skin.translation - middle;
-    const Rigid start{half, middle + half * (transpose(turn) * from)};
-    double score =
-        judge(s, s.target, turned, field, refine_rigid(s.coarse, s.target, start, rigid)).score_mm;
+    const Vector3 at = best.rigid.target_from_skin.translation, from = at - middle;
+    const auto score_from = [&](const Rigid& start) {
+        return bare_mm(
+            judge(s, s.target, turned, field, refine_rigid(s.coarse, s.target, start, rigid)));
+    };
+    double score = score_from({half, middle + half * (transpose(turn) * from)});
+    // The middle of a strip lies in the skin: there the body turns where it lies.
+    if (best.skin_coverage < kLittleSkin) score = std::min(score, score_from({half, at}));
     for (const JudgedPose& p : judged)  // the search may have come to a better one
         if (turned_front_to_back(best, p)) score = std::min(score, bare_mm(p));
     choice->front_turned_score_mm = score;
-    const double here = best.score_mm;
+    const double here = bare_mm(best);
     const std::string scores =
         text("it fits to %.2f mm turned front to back and to %.2f mm as it lies", score, here);
     Verdict verdict = verdict_of(here, score, margin_of(best, kOppositeScore));
@@ -477,6 +530,13 @@ PoseChoice choose_pose(const FitContext& s,
         // A pose that one start alone has found may have a better one beside it that none has.
         if (judged[0].rigid.found > 1 || search == kMoreSearches) break;
         rigid.starts *= 2;
+    }
+    if (!choice.open_side_dropped &&
+        is_strip_of_flank(s, options, given, field, judged[0], progress)) {
+        choice.open_side_dropped = true;
+        given.hints.back.reset();
+        judged = judge_candidates(s, s.target, given, field, rigid, progress);
+        rank(judged);
     }
     choice.best = judged[0];
     for (std::size_t n = 1; n < judged.size(); ++n) {

@@ -3,6 +3,7 @@
 #include "pipeline/registration/register_surfaces.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -80,7 +81,16 @@ void warn_of_readings(StageReport& report, const FitContext& s, const FitMeasure
                  "again, more densely",
                  static_cast<long>(t.points.size()), t.spacing_mm));
     }
-    if (fit.coverage < 0.5) {
+    // Careful sweeps have none; buttocks that are pressed flat, or an arm, some in a hundred.
+    const bool off_skin = fit.off_skin > fit.readings / 20;
+    if (off_skin) {
+        report.warnings.push_back(
+            text("%ld of %ld readings lie more than %.0f mm off the fitted skin, and not beyond "
+                 "its ends: if they are of a hand or an arm, a table or a sensor that was laid "
+                 "down, leave them out and fit again",
+                 fit.off_skin, fit.readings, kOffSkinMm));
+    }
+    if (fit.coverage < 0.5 && !off_skin) {
         report.warnings.push_back(text(
             "only %.0f %% of the readings have a counterpart on the patient's skin: is it the same "
             "part of the body?",
@@ -96,6 +106,46 @@ void warn_of_readings(StageReport& report, const FitContext& s, const FitMeasure
                 ? "add a landmark low on the body, such as the crotch (--landmarks FILE.csv)"
                 : "give the head direction (--up X,Y,Z) and a landmark low on the body, such "
                   "as the crotch (--landmarks FILE.csv)"));
+    }
+}
+
+// How wide and how deep the readings are, in ratio to the patient who lies so: the middle nine
+// tenths of both.
+std::array<double, 2> size_ratios(const FitContext& s, const Rigid& pose) {
+    std::array<double, 2> ratios{};
+    const auto extent = [](std::vector<double> along) {
+        std::sort(along.begin(), along.end());
+        return along[along.size() - 1 - along.size() / 20] - along[along.size() / 20];
+    };
+    for (int axis = 0; axis < 2; ++axis) {
+        std::vector<double> readings, skin;
+        for (const std::uint32_t i : s.readings)
+            readings.push_back(dot(pose.rotation.column(axis), s.target.points[i] - Point3{}));
+        for (const Point3 p : s.fine.points) skin.push_back(p[axis]);
+        if (readings.empty() || skin.empty()) return {1, 1};
+        ratios[static_cast<std::size_t>(axis)] =
+            extent(std::move(readings)) / std::max(1.0, extent(std::move(skin)));
+    }
+    return ratios;
+}
+
+// A child on an adult's mannequin, or readings in another unit. Another build is up to 1.2 times as
+// wide and as deep; a front has its full width and a flank its full depth.
+void warn_of_size(StageReport& report, const FitContext& s, const Rigid& pose) {
+    constexpr double kSmaller = 0.75, kLarger = 1.3, kEither = 1.15;
+    const auto [wide, deep] = size_ratios(s, pose);
+    const double both = std::sqrt(wide * deep);
+    if (both < kSmaller && std::max(wide, deep) < 1 / kEither) {
+        report.warnings.push_back(
+            text("the readings are %.2f times as wide and %.2f times as deep as the patient: they "
+                 "are of a smaller body, or of a small part of one; choose a mannequin nearer to "
+                 "his size, or check both units (--scale)",
+                 wide, deep));
+    } else if (both > kLarger && std::min(wide, deep) > kEither) {
+        report.warnings.push_back(
+            text("the readings are %.2f times as wide and %.2f times as deep as the patient: "
+                 "choose a mannequin nearer to his size, or check both units (--scale)",
+                 wide, deep));
     }
 }
 
@@ -169,6 +219,7 @@ StageReport warp_report(const FitContext& s,
     report.measures.push_back({"skin_behind_table_mm", w.fit.behind_table_mm});
     report.measures.push_back({"counterparts", static_cast<double>(w.fit.counterparts)});
     report.measures.push_back({"unexplained_readings", static_cast<double>(w.fit.unexplained)});
+    report.measures.push_back({"readings_off_skin", static_cast<double>(w.fit.off_skin)});
     add_fit(report, "quadratic", w.quadratic_fit);
     if (options.paper_warp) {
         report.measures.push_back({"consensus", w.ransac.consensus});
@@ -223,6 +274,7 @@ RegisterResult align(const FitContext& s,
     result.rigid_fit = result.quadratic_fit = result.fit;
     result.runners_up = choice.runners_up;
     result.report = align_report(s, choice, result.fit, watch.seconds());
+    warn_of_size(result.report, s, chosen);
     result.registration.reports = {result.report};
     return result;
 }

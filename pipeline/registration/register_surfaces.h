@@ -37,7 +37,7 @@
 
 namespace sonocase::pipeline::inline registration {
 
-inline constexpr int kRegisterVersion = 8;
+inline constexpr int kRegisterVersion = 9;
 
 // The same point of the body on both surfaces, e.g. navel or crotch.
 struct Landmark {

@@ -155,9 +155,17 @@ void add_probe_bar(const ReviewInput& input, const TimeAxis& axis, double y, Svg
         axis, times, [&](std::size_t i) { return on_skin[i]; }, y, "class=\"bar probe\"", svg);
 }
 
-// One mark per event, described where the pointer rests on it; names only if there is room.
+// "needle entry"
+std::string event_words(std::string name) {
+    std::replace(name.begin(), name.end(), '_', ' ');
+    return name;
+}
+
+// One mark per event, described where the pointer rests on it; names below the marks, in the first
+// of two rows that has room.
 void add_events(const ReviewInput& input, const TimeAxis& axis, double y, Svg& svg) {
-    double free_from = -1;
+    constexpr double kLetter = 6.2, kRow = 14, kGap = 8;
+    double free_from[] = {-1, -1};
     for (const SessionEvent& event : input.session.events) {
         const double x = axis.x(event.time_s);
         const std::string kind = event.name.substr(0, 5) == "no_go" ? "bad"
@@ -166,14 +174,15 @@ void add_events(const ReviewInput& input, const TimeAxis& axis, double y, Svg& s
         svg.open_group(
             "class=\"event " + kind + "\"",
             svg_number(event.time_s - axis.from_s) + " s: " + event.name + " " + event.detail);
-        svg.line(x, y, x, y + 16, "");
-        if (x > free_from) {
-            std::string name = event.name;
-            std::replace(name.begin(), name.end(), '_', ' ');
-            const bool at_end = x > kWidth - 120;
-            svg.text(x + (at_end ? -4 : 4), y + 12, name,
-                     at_end ? "class=\"mark end\"" : "class=\"mark\"");
-            free_from = x + 8 + 6.5 * static_cast<double>(name.size());
+        svg.line(x, y, x, y + 10, "");
+        const std::string name = input.words(event_words(event.name));
+        const double width = kLetter * static_cast<double>(name.size());
+        const double from = std::min(x - 1, kWidth - width);
+        for (int row = 0; row < 2; ++row) {
+            if (from < free_from[row]) continue;
+            svg.text(from, y + 22 + kRow * row, name, "class=\"mark\"");
+            free_from[row] = from + width + kGap;
+            break;
         }
         svg.close_group();
     }
@@ -197,23 +206,24 @@ std::string timeline_svg(const ReviewInput& input) {
     const SessionCurves& c = input.score.curves;
     Svg svg;
     double y = 8;
-    svg.text(8, y + 10, "probe on skin", "class=\"name\"");
+    svg.text(8, y + 10, input.words("probe on skin"), "class=\"name\"");
     add_probe_bar(input, axis, y, svg);
     y += 22;
-    svg.text(8, y + 10, "needle in tissue", "class=\"name\"");
+    svg.text(8, y + 10, input.words("needle in tissue"), "class=\"name\"");
     add_bars(
         axis, c.time_s, [&](std::size_t i) { return c.depth_mm[i] > 0; }, y, "class=\"bar needle\"",
         svg);
     y += 26;
-    svg.text(8, y + 12, "events", "class=\"name\"");
+    svg.text(8, y + 12, input.words("events"), "class=\"name\"");
     add_events(input, axis, y, svg);
-    y += 30;
+    y += 48;
     const Lane lanes[] = {
-        {"inserted length", "mm", &c.depth_mm, NAN, 10, false},
-        {"tip to target", "mm, nearest", &c.tip_to_target_mm, pass_distance_mm(input.exercise), 10,
-         false},
-        {"tip to scan plane", "mm", &c.plane_distance_mm, NAN, 5, true},
-        {"needle visible", "part inside the sector", &c.in_beam_fraction, NAN, 1, false}};
+        {input.words("inserted length"), "mm", &c.depth_mm, NAN, 10, false},
+        {input.words("tip to target"), input.words("mm, nearest"), &c.tip_to_target_mm,
+         pass_distance_mm(input.exercise), 10, false},
+        {input.words("tip to scan plane"), "mm", &c.plane_distance_mm, NAN, 5, true},
+        {input.words("needle visible"), input.words("part inside the sector"), &c.in_beam_fraction,
+         NAN, 1, false}};
     const double lanes_from = y;
     if (!c.time_s.empty()) {
         for (const Lane& lane : lanes) {
@@ -228,7 +238,9 @@ std::string timeline_svg(const ReviewInput& input) {
         svg.text(x, y + 6, svg_number(t) + " s", "class=\"tick middle\"");
     }
     y += 16;
-    return svg.picture(kWidth, y, "class=\"timeline\" role=\"img\" aria-label=\"Time line\"");
+    return svg.picture(kWidth, y,
+                       "class=\"timeline\" role=\"img\" aria-label=\"" +
+                           escaped_html(input.words("Time line")) + "\"");
 }
 
 std::string progress_svg(const ReviewInput& input, const std::string& metric) {
@@ -277,18 +289,23 @@ std::string progress_svg(const ReviewInput& input, const std::string& metric) {
 
 namespace {
 
-const HtmlTemplate& page_template() {
-    static const HtmlTemplate page(kReviewPageHtml);
-    return page;
-}
+// The page in the language of its reader.
+struct Page {
+    explicit Page(const ReviewInput& of)
+        : input(of),
+          html(kReviewPageHtml, [&of](std::string_view english) { return of.words(english); }) {}
 
-std::string filled(std::string_view block, const HtmlValues& values) {
-    return page_template().filled(block, values);
-}
+    std::string filled(std::string_view block, const HtmlValues& values) const {
+        return html.filled(block, values);
+    }
+    std::string figure(const std::vector<std::uint8_t>& png, const std::string& caption) const {
+        return filled("figure", {{"caption", escaped_html(caption)}, {"png", base64(png)}});
+    }
+    std::string words(const Message& english) const { return input.language->words(english); }
 
-std::string figure(const std::vector<std::uint8_t>& png, const std::string& caption) {
-    return filled("figure", {{"caption", escaped_html(caption)}, {"png", base64(png)}});
-}
+    const ReviewInput& input;
+    HtmlTemplate html;
+};
 
 std::string shown(double value, const std::string& name) {
     if (!std::isfinite(value)) return "\u2013";
@@ -306,80 +323,94 @@ std::string shown(double value, const std::string& name) {
     return text;
 }
 
-std::string limits(const PassResult& mark) {
+std::string limits(const Page& page, const PassResult& mark) {
     std::string out;
-    if (std::isfinite(mark.at_least)) out += "at least " + shown(mark.at_least, mark.metric);
+    if (std::isfinite(mark.at_least))
+        out += page.words({"at least {}", {shown(mark.at_least, mark.metric)}});
     if (std::isfinite(mark.at_most))
-        out += (out.empty() ? "" : ", ") + ("at most " + shown(mark.at_most, mark.metric));
+        out += (out.empty() ? "" : ", ") +
+               page.words({"at most {}", {shown(mark.at_most, mark.metric)}});
     return out;
 }
 
-std::string cards(const ReviewInput& input) {
+std::string cards(const Page& page) {
+    const ReviewInput& input = page.input;
     std::string out;
     for (const char* name : {"elapsed_time_s", "final_tip_to_target_mm", "targets_hit",
                              "insertions", "time_in_tissue_s", "needle_in_beam_fraction",
                              "tip_in_view_at_advance_fraction", "no_go_contacts"}) {
-        out += filled("card", {{"value", shown(input.score.value(name), name)},
-                               {"title", escaped_html(find_metric(name)->title)}});
+        out += page.filled("card", {{"value", shown(input.score.value(name), name)},
+                                    {"title", escaped_html(page.words(find_metric(name)->title))}});
     }
     return out;
 }
 
-std::string pass_marks(const ReviewInput& input) {
+std::string pass_marks(const Page& page) {
+    const ReviewInput& input = page.input;
     if (input.score.pass_marks.empty()) return "";
     std::string rows;
     for (const PassResult& mark : input.score.pass_marks) {
         const MetricInfo* info = find_metric(mark.metric);
-        rows += filled("pass_mark", {{"title", escaped_html(info ? info->title : mark.metric)},
-                                     {"value", shown(mark.value, mark.metric)},
-                                     {"limits", limits(mark)},
-                                     {"class", mark.passed ? "good" : "bad"},
-                                     {"verdict", mark.passed ? "passed" : "not passed"}});
+        rows += page.filled("pass_mark",
+                            {{"title", escaped_html(info ? page.words(info->title) : mark.metric)},
+                             {"value", shown(mark.value, mark.metric)},
+                             {"limits", limits(page, mark)},
+                             {"class", mark.passed ? "good" : "bad"},
+                             {"verdict", page.words(mark.passed ? "passed" : "not passed")}});
     }
-    return filled("pass_marks", {{"rows", rows}});
+    return page.filled("pass_marks", {{"rows", rows}});
 }
 
 std::string seconds_words(double time_s) {
     return time_s < 0 ? "\u2013" : number_text(time_s, 3) + " s";
 }
 
+std::string title_of(const ReviewInput& input, const ProcedureResult::Item& item) {
+    for (const ExerciseTexts::Item& text : input.texts.items)
+        if (text.name == item.name) return text.title;
+    return item.title;
+}
+
 // The list of a procedure, and below it what went wrong.
-std::string checklist(const ReviewInput& input) {
+std::string checklist(const Page& page) {
+    const ReviewInput& input = page.input;
     if (!input.score.procedure) return "";
     const ProcedureResult& list = *input.score.procedure;
     std::string rows;
     for (const ProcedureResult::Item& item : list.items) {
-        std::string why = item.why;
-        std::replace(why.begin(), why.end(), '_', ' ');
-        rows += filled("checklist_item",
-                       {{"title", escaped_html(item.title) + (item.critical ? " (critical)" : "")},
-                        {"when", seconds_words(item.time_s)},
-                        {"class", item.ticked ? "good" : "bad"},
-                        {"verdict", item.ticked ? "done" : why},
-                        {"source", escaped_html(item.source)}});
+        rows +=
+            page.filled("checklist_item",
+                        {{"title", escaped_html(title_of(input, item)) +
+                                       (item.critical ? " (" + page.words("critical") + ")" : "")},
+                         {"when", seconds_words(item.time_s)},
+                         {"class", item.ticked ? "good" : "bad"},
+                         {"verdict", page.words(item.ticked ? "Done" : missed_words(item.why))},
+                         {"source", escaped_html(item.source)}});
     }
     const auto& names = complication_names();
     for (const ProcedureResult::Happened& one : list.complications) {
         const auto at = std::find(names.begin(), names.end(), one.name) - names.begin();
-        rows += filled("checklist_item",
-                       {{"title", complication_titles()[static_cast<std::size_t>(at)]},
-                        {"when", seconds_words(one.time_s)},
-                        {"class", "bad"},
-                        {"verdict", "complication"},
-                        {"source", ""}});
+        rows +=
+            page.filled("checklist_item",
+                        {{"title", page.words(complication_titles()[static_cast<std::size_t>(at)])},
+                         {"when", seconds_words(one.time_s)},
+                         {"class", "bad"},
+                         {"verdict", page.words("complication")},
+                         {"source", ""}});
     }
-    std::string points = number_text(list.points, 4) + " points of " +
-                         number_text(list.max_points, 4) + ", " + number_text(list.cut, 4) +
-                         " needed.";
+    std::string points = page.words(
+        {"{} points of {}, {} needed.",
+         {number_text(list.points, 4), number_text(list.max_points, 4), number_text(list.cut, 4)}});
     if (list.stray_acts > list.stray_acts_at_most)
-        points += " " + std::to_string(list.stray_acts) +
-                  " acts where no step asks for them; at most " +
-                  std::to_string(list.stray_acts_at_most) + " pass.";
-    return filled("checklist", {{"points", points}, {"rows", rows}});
+        points += " " + page.words({"{} acts where no step asks for them; at most {} pass.",
+                                    {std::to_string(list.stray_acts),
+                                     std::to_string(list.stray_acts_at_most)}});
+    return page.filled("checklist", {{"points", points}, {"rows", rows}});
 }
 
 // The score of the last session, marked as better or worse, and the course over all sessions.
-std::string comparison(const ReviewInput& input, const MetricInfo& info, double value) {
+std::string comparison(const Page& page, const MetricInfo& info, double value) {
+    const ReviewInput& input = page.input;
     double before = NAN;
     for (const Metric& m : input.earlier.back().metrics) {
         if (m.name == info.name) before = m.value;
@@ -389,11 +420,11 @@ std::string comparison(const ReviewInput& input, const MetricInfo& info, double 
                         (info.sense == MetricSense::more_is_better && change > 0);
     const bool worse =
         info.sense != MetricSense::neutral && !better && change != 0 && std::isfinite(change);
-    return filled("comparison", {{"class", better  ? "good"
-                                           : worse ? "bad"
-                                                   : ""},
-                                 {"before", shown(before, info.name)},
-                                 {"progress", progress_svg(input, info.name)}});
+    return page.filled("comparison", {{"class", better  ? "good"
+                                                : worse ? "bad"
+                                                        : ""},
+                                      {"before", shown(before, info.name)},
+                                      {"progress", progress_svg(input, info.name)}});
 }
 
 std::string meaning(const MetricInfo& info) {
@@ -403,7 +434,8 @@ std::string meaning(const MetricInfo& info) {
 }
 
 // The groups of the metrics that have evidence, or of the others.
-std::string score_groups(const ReviewInput& input, bool evidence) {
+std::string score_groups(const Page& page, bool evidence) {
+    const ReviewInput& input = page.input;
     static constexpr struct {
         const char* group;
         const char* title;
@@ -417,91 +449,95 @@ std::string score_groups(const ReviewInput& input, bool evidence) {
             if (std::string(info.group) != group.group) continue;
             if ((info.evidence[0] != 0) != evidence) continue;
             const double value = input.score.value(info.name);
-            rows +=
-                filled("score", {{"name", escaped_html(meaning(info))},
-                                 {"title", escaped_html(info.title)},
+            rows += page.filled("score",
+                                {{"name", escaped_html(meaning(info))},
+                                 {"title", escaped_html(page.words(info.title))},
                                  {"value", shown(value, info.name)},
-                                 {"comparison", compare ? comparison(input, info, value) : ""}});
+                                 {"comparison", compare ? comparison(page, info, value) : ""}});
         }
         if (rows.empty()) continue;
-        groups +=
-            filled("score_group", {{"title", group.title},
-                                   {"comparison", compare ? filled("comparison_head", {}) : ""},
-                                   {"rows", rows}});
+        groups += page.filled("score_group",
+                              {{"title", page.words(group.title)},
+                               {"comparison", compare ? page.filled("comparison_head", {}) : ""},
+                               {"rows", rows}});
     }
     return groups;
 }
 
-std::string score_table(const ReviewInput& input) {
-    return filled("scores",
-                  {{"groups", score_groups(input, true)}, {"others", score_groups(input, false)}});
+std::string score_table(const Page& page) {
+    return page.filled(
+        "scores", {{"groups", score_groups(page, true)}, {"others", score_groups(page, false)}});
 }
 
-std::string insertions(const ReviewInput& input) {
+std::string insertions(const Page& page) {
+    const ReviewInput& input = page.input;
     if (input.score.insertions.empty()) return "";
     std::string rows;
     const double start_s = input.session.samples.front().time_s;
     int number = 0;
     for (const InsertionScore& s : input.score.insertions) {
         const auto target = static_cast<std::size_t>(s.target);
-        rows +=
-            filled("insertion",
-                   {{"number", std::to_string(++number)},
-                    {"entry", shown(s.entry_s - start_s, "t_s")},
-                    {"exit", s.still_in ? "stays in" : shown(s.exit_s - start_s, "t_s")},
-                    {"deepest", shown(s.deepest_mm, "d_mm")},
-                    {"target",
-                     s.target < 0 ? "\u2013" : escaped_html(input.exercise.targets[target].name)},
-                    {"tip_to_target", shown(s.tip_to_target_mm, "d_mm")}});
+        rows += page.filled(
+            "insertion",
+            {{"number", std::to_string(++number)},
+             {"entry", shown(s.entry_s - start_s, "t_s")},
+             {"exit", s.still_in ? page.words("stays in") : shown(s.exit_s - start_s, "t_s")},
+             {"deepest", shown(s.deepest_mm, "d_mm")},
+             {"target",
+              s.target < 0 ? "\u2013" : escaped_html(input.exercise.targets[target].name)},
+             {"tip_to_target", shown(s.tip_to_target_mm, "d_mm")}});
     }
-    return filled("insertions", {{"rows", rows}});
+    return page.filled("insertions", {{"rows", rows}});
 }
 
-std::string frames(const ReviewInput& input) {
+std::string frames(const Page& page) {
+    const ReviewInput& input = page.input;
     const Sequence& p = input.pictures;
     if (p.frames.empty()) return "";
     std::string figures;
     const double start_s = input.session.samples.front().time_s;
     for (std::size_t i = 0; i < p.frames.size(); ++i) {
-        std::string what = "frame";
+        std::string what = "picture";
         for (const SequenceField& field : p.frames[i].fields) {
             if (field.name == "Event") what = field.value;
         }
-        std::replace(what.begin(), what.end(), '_', ' ');
-        figures += figure(png_from_grey(p.pixels.data() + i * p.frame_bytes(), p.width, p.height),
-                          what + ", " + shown(p.frames[i].timestamp_s - start_s, "t_s"));
+        figures += page.figure(
+            png_from_grey(p.pixels.data() + i * p.frame_bytes(), p.width, p.height),
+            page.words(event_words(what)) + ", " + shown(p.frames[i].timestamp_s - start_s, "t_s"));
     }
-    return filled("frames", {{"figures", figures}});
+    return page.filled("frames", {{"figures", figures}});
 }
 
 }  // namespace
 
 std::string review_page(const ReviewInput& input, const std::vector<SessionView>& views) {
+    const Page page(input);
     const SessionHeader& header = input.session.header;
     const std::string dot = " \u00b7 ";
     std::string verdict, warnings, figures;
     if (!input.score.pass_marks.empty() || input.score.procedure)
-        verdict = filled(input.score.passed ? "verdict_passed" : "verdict_not_passed", {});
+        verdict = page.filled(input.score.passed ? "verdict_passed" : "verdict_not_passed", {});
     for (const auto* list : {&input.warnings, &input.score.warnings}) {
-        for (const std::string& warning : *list)
-            warnings += filled("warning", {{"text", escaped_html(warning)}});
+        for (const Message& warning : *list)
+            warnings += page.filled("warning", {{"text", escaped_html(page.words(warning))}});
     }
-    for (const SessionView& view : views) figures += figure(view.png, view.title);
-    return filled(
-        "page", {{"title", escaped_html(input.exercise.title)},
+    for (const SessionView& view : views) figures += page.figure(view.png, page.words(view.title));
+    return page.filled(
+        "page", {{"language", input.language->code},
+                 {"title", escaped_html(input.texts.title)},
                  {"trainee", header.trainee.empty() ? "" : escaped_html(header.trainee) + dot},
                  {"case", escaped_html(input.bundle.manifest.case_name)},
                  {"started", header.started.empty() ? "" : dot + escaped_html(header.started)},
                  {"verdict", verdict},
                  {"warnings", warnings},
-                 {"cards", cards(input)},
-                 {"checklist", checklist(input)},
-                 {"pass_marks", pass_marks(input)},
+                 {"cards", cards(page)},
+                 {"checklist", checklist(page)},
+                 {"pass_marks", pass_marks(page)},
                  {"time_line", timeline_svg(input)},
-                 {"insertions", insertions(input)},
-                 {"frames", frames(input)},
-                 {"views", views.empty() ? "" : filled("views", {{"figures", figures}})},
-                 {"scores", score_table(input)},
+                 {"insertions", insertions(page)},
+                 {"frames", frames(page)},
+                 {"views", views.empty() ? "" : page.filled("views", {{"figures", figures}})},
+                 {"scores", score_table(page)},
                  {"program", escaped_html(header.program.empty() ? "sonocase" : header.program)}});
 }
 
@@ -524,15 +560,15 @@ Result<StageReport> make_review(const std::string& session_path,
         return Error{"cannot make the folder: " + failed.message(), folder, "check the path"};
     const auto views = render_session_views(input, options);
     if (!views) {
-        input.warnings.push_back("No 3-D views could be rendered: " + views.error().message() +
-                                 ".");
+        input.warnings.push_back(
+            {"No 3-D views could be rendered: {}.", {views.error().message()}});
     }
     report.measures.push_back({"views", views ? static_cast<double>(views->size()) : 0});
     const std::string page = review_page(input, views ? *views : std::vector<SessionView>{});
     SONOCASE_TRY_DONE(write_file(folder + "/review.html", page));
     SONOCASE_TRY_DONE(write_file(folder + "/scores.json", score_json(input.score, input.exercise)));
     report.measures.push_back({"readings", static_cast<double>(input.session.samples.size())});
-    report.warnings = input.warnings;
+    report.warnings.assign(input.warnings.begin(), input.warnings.end());
     report.seconds = seconds();
     if (seen != nullptr) *seen = std::move(input);
     return report;

@@ -25,32 +25,40 @@ std::string pictures_of(const std::string& session_path) {
 
 }  // namespace
 
-Result<Exercise> find_review_exercise(const CaseBundle& bundle,
-                                      const std::string& wanted,
-                                      const std::string& named_by_session,
-                                      std::vector<std::string>& warnings) {
+Result<ReviewedExercise> find_review_exercise(const CaseBundle& bundle,
+                                              const std::string& wanted,
+                                              const std::string& named_by_session,
+                                              std::vector<Message>& warnings) {
+    const auto parsed = [](const std::string& toml,
+                           const std::string& where) -> Result<ReviewedExercise> {
+        SONOCASE_TRY(auto exercise, parse_exercise(toml, where));
+        SONOCASE_TRY(auto texts, parse_exercise_texts(toml, where));
+        return ReviewedExercise{std::move(exercise), std::move(texts)};
+    };
     if (wanted.find(".toml") != std::string::npos) {
         SONOCASE_TRY(const auto text, read_text_file(wanted));
-        return parse_exercise(text, wanted);
+        return parsed(text, wanted);
     }
     const std::string name = wanted.empty() ? named_by_session : wanted;
     std::vector<std::string> names;
     for (const EmbeddedExercise& embedded : bundle.exercises) {
-        if (embedded.name == name) return parse_exercise(embedded.toml, "exercise " + name);
+        if (embedded.name == name) return parsed(embedded.toml, "exercise " + name);
         names.push_back(embedded.name);
     }
     if (!wanted.empty()) {
         return Error{"the case has no exercise '" + wanted + "'", "", suggest_name(wanted, names)};
     }
     if (!name.empty()) {
-        warnings.push_back("The case has no exercise '" + name +
-                           "': the session is shown without targets and pass marks.");
+        warnings.push_back(
+            {"The case has no exercise '{}': the session is shown without targets "
+             "and pass marks.",
+             {name}});
     }
     Exercise free_scan;
     free_scan.name = name;
     free_scan.title = "Free scan";
     free_scan.kind = "scan";
-    return free_scan;
+    return ReviewedExercise{std::move(free_scan), {}};
 }
 
 Result<ReviewInput> load_review(const std::string& session_path,
@@ -58,6 +66,7 @@ Result<ReviewInput> load_review(const std::string& session_path,
                                 const ReviewOptions& options) {
     ReviewInput input;
     input.session_path = session_path;
+    input.language = &find_language(options.language);
     // The file as read, a gigabyte for eight hours, is freed before the session is evaluated.
     SONOCASE_TRY(auto session, [&]() -> Result<Session> {
         const auto sequence = load_recording_file(session_path);
@@ -65,7 +74,7 @@ Result<ReviewInput> load_review(const std::string& session_path,
         return session_from_sequence(*sequence, guess_names(*sequence), session_path);
     }());
     if (const auto status = check_session(session, session_path); !status)
-        input.warnings.push_back("The session cannot be judged: " + status.error().message() + ".");
+        input.warnings.push_back({"The session cannot be judged: {}.", {status.error().message()}});
     for (const Message& note : session.notes) input.warnings.push_back(note);
     input.session = std::move(session);
     if (input.session.samples.empty()) {
@@ -75,14 +84,16 @@ Result<ReviewInput> load_review(const std::string& session_path,
     input.bundle = std::move(bundle);
     const SessionHeader& header = input.session.header;
     if (!header.case_name.empty() && header.case_name != input.bundle.manifest.case_name) {
-        input.warnings.push_back("The session was recorded on the case '" + header.case_name +
-                                 "' and not on '" + input.bundle.manifest.case_name + "'.");
+        input.warnings.push_back({"The session was recorded on the case '{}' and not on '{}'.",
+                                  {header.case_name, input.bundle.manifest.case_name}});
     }
-    SONOCASE_TRY(auto exercise, find_review_exercise(input.bundle, options.exercise,
-                                                     header.exercise, input.warnings));
+    SONOCASE_TRY(const auto reviewed, find_review_exercise(input.bundle, options.exercise,
+                                                           header.exercise, input.warnings));
     const CaseAnatomy at_rest(input.bundle);
-    AttemptDraw drawn = draw_attempt(exercise, at_rest, input.bundle.labels, attempt_seed(header));
+    AttemptDraw drawn =
+        draw_attempt(reviewed.exercise, at_rest, input.bundle.labels, attempt_seed(header));
     input.exercise = std::move(drawn.exercise);
+    input.texts = texts_in(input.exercise, reviewed.texts, input.language->code);
     input.warnings.insert(input.warnings.end(), drawn.warnings.begin(), drawn.warnings.end());
     if (options.exercise.empty() && !header.exercise_digest.empty()) {
         for (const EmbeddedExercise& embedded : input.bundle.exercises) {
@@ -106,8 +117,8 @@ Result<ReviewInput> load_review(const std::string& session_path,
             input.pictures = std::move(*kept);
         } else {
             input.warnings.push_back(
-                "The kept frames could not be read" +
-                (kept ? std::string(".") : ": " + kept.error().message() + "."));
+                {"The kept frames could not be read: {}.",
+                 {kept ? Message("they are no grey pictures") : kept.error().message()}});
         }
     }
     if (!options.progress_path.empty() && !header.trainee.empty() &&

@@ -3,10 +3,13 @@
 #include "pipeline/tradeoff/tradeoff_page.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <sstream>
 
 #include "formats/files/atomic_file.h"
 #include "formats/text/number_text.h"
+#include "pipeline/base/text.h"
 #include "pipeline/pictures/chart.h"
 #include "pipeline/pictures/markup.h"
 #include "pipeline/stages/built_in_stages.h"
@@ -71,7 +74,9 @@ Chart suite_chart(const Suite& suite, const std::vector<Trial>& trials) {
         if (!shown || !std::isfinite(t.error)) continue;
         const auto own = t.role == TrialRole::paper ? std::array<std::uint8_t, 3>{213, 40, 0}
                                                     : marks[colour++ % marks.size()];
-        chart.series.push_back({t.name, {t.seconds}, {t.error}, SeriesStyle::points, own, 4.5});
+        // The standard is often a preset as well: it shows as a ring round it.
+        const double width = t.role == TrialRole::standard ? 7 : 4.5;
+        chart.series.push_back({t.name, {t.seconds}, {t.error}, SeriesStyle::points, own, width});
     }
     return chart;
 }
@@ -239,10 +244,83 @@ std::string markdown_section(const PageInput& input, const Suite& suite) {
     return text;
 }
 
+// What a part of the page says of itself.
+struct PartSummary {
+    std::string title, error_name;
+    std::string paper, standard, least;  // "5.64 in 1.95 s"; empty: none
+    double least_error = INFINITY;
+};
+
+PartSummary summary_of(const std::string& part) {
+    PartSummary summary;
+    const auto figures = [](std::string_view error, std::string_view seconds) {
+        return std::string(trimmed(error)) + " in " + std::string(trimmed(seconds)) + " s";
+    };
+    const auto tried = [&](std::string_view error, std::string_view seconds) {
+        const auto value = number_in(trimmed(error));
+        if (!value || !(*value < summary.least_error)) return;
+        summary.least_error = *value;
+        summary.least = figures(error, seconds);
+    };
+    std::istringstream lines(part);
+    for (std::string line; std::getline(lines, line);) {
+        if (line.starts_with("## ")) summary.title = line.substr(3);
+        if (!line.starts_with("| ")) continue;
+        const std::vector<std::string> cells = split_line(line, '|');
+        if (cells.size() == 7) {  // "8: 1.07, 2.46; 3: 1.01, 2.62;" of a knob
+            std::istringstream values(cells[5]);
+            for (std::string value; std::getline(values, value, ';');) {
+                const std::size_t colon = value.find(": "), comma = value.find(", ");
+                if (colon < comma && comma != std::string::npos)
+                    tried(value.substr(colon + 2, comma - colon - 2), value.substr(comma + 2));
+            }
+        }
+        if (cells.size() != 5) continue;
+        if (cells[1] == "setting") {
+            summary.error_name = cells[2];
+        } else if (number_in(cells[3])) {
+            tried(cells[2], cells[3]);
+            if (cells[1] == "standard") summary.standard = figures(cells[2], cells[3]);
+            if (cells[1].find("paper") != std::string::npos)
+                summary.paper = figures(cells[2], cells[3]);
+        }
+    }
+    return summary;
+}
+
+// A link to a heading of the same page, as GitHub makes them.
+std::string link_to(const std::string& title) {
+    std::string anchor;
+    for (const char c : lower_case(title)) {
+        if (c == ' ' || c == '-')
+            anchor += '-';
+        else if (std::isalnum(static_cast<unsigned char>(c)) || c == '_')
+            anchor += c;
+    }
+    return "[" + title + "](#" + anchor + ")";
+}
+
+// A line for each part that has a standard with an error.
+std::string overview_table(const std::string& parts) {
+    std::string table =
+        "\n| what | error | the paper's method | standard | least error tried |\n"
+        "|---|---|---|---|---|\n";
+    for (std::size_t at = parts.find("\n## "); at != std::string::npos;) {
+        const std::size_t next = parts.find("\n## ", at + 1);
+        const PartSummary s =
+            summary_of(parts.substr(at, next == std::string::npos ? next : next - at));
+        if (!s.standard.empty() && !s.standard.starts_with("0 "))
+            table += "| " + link_to(s.title) + " | " + s.error_name + " | " + s.paper + " | **" +
+                     s.standard + "** | " + s.least + " |\n";
+        at = next;
+    }
+    return table;
+}
+
 }  // namespace
 
 std::string format_accuracy_markdown(const PageInput& input, const std::string& before) {
-    std::string text =
+    const std::string opening =
         "# What accuracy costs\n\n"
         "Written by `scripts/accuracy` from the table of knobs and a sweep (`sonocase tradeoff`); "
         "do not edit.\n"
@@ -250,7 +328,9 @@ std::string format_accuracy_markdown(const PageInput& input, const std::string& 
         "part names its machine.\n\n"
         "![error against seconds](pictures/accuracy.png)\n\n"
         "Lower and further left is better; both axes are logarithmic. Red: the paper's own "
-        "method. Blue: the front, of which no setting tried is beaten in both.\n";
+        "method. Blue: the front, of which no setting tried is beaten in both. Below, one line for "
+        "each part: how large the error is, and in how many seconds.\n";
+    std::string text;
     // Parts that this sweep has, in the places of those before; the others as they were.
     const std::string options = options_table();
     std::vector<bool> written(input.suites.size(), false);
@@ -269,7 +349,7 @@ std::string format_accuracy_markdown(const PageInput& input, const std::string& 
     }
     for (std::size_t i = 0; i < input.suites.size(); ++i)
         if (!written[i]) text += markdown_section(input, input.suites[i]);
-    return text + options;
+    return opening + overview_table(text) + text + options;
 }
 
 }  // namespace sonocase::pipeline::inline tradeoff

@@ -27,8 +27,8 @@ Status write_tradeoff_page(const PageInput& input, const std::string& folder);
 // the file cannot be written.
 Status write_overview_picture(const PageInput& input, const std::string& path);
 
-// The text of docs/accuracy.md: the table of knobs, from the suites, and the figures of the trials;
-// parts of the text before whose suites are not in the input stay.
+// The text of docs/accuracy.md: a line for each part, then the table of knobs, from the suites, and
+// the figures of the trials; parts of the text before whose suites are not in the input stay.
 std::string format_accuracy_markdown(const PageInput& input, const std::string& before);
 
 }  // namespace sonocase::pipeline::inline tradeoff

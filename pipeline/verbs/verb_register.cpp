@@ -21,6 +21,7 @@
 #include "formats/files/atomic_file.h"
 #include "formats/text/number_text.h"
 #include "pipeline/base/parallel.h"
+#include "pipeline/base/text.h"
 #include "pipeline/import/mesh/surface_file.h"
 #include "pipeline/import/volume/label_map.h"
 #include "pipeline/registration/fit_pictures.h"
@@ -287,26 +288,29 @@ void print_fit(const RegisterResult& result) {
     line("rigid", result.rigid_fit);
     line("quadratic", result.quadratic_fit);
     line("final", result.fit);
-    std::printf("det J >= %.3f (proven)\n", result.registration.min_det_jacobian);
+    std::printf("no fold: nothing shrinks below %.3f of its volume (det J, proven)\n",
+                result.registration.min_det_jacobian);
+    std::string at_worst;
     if (!result.unknown.empty()) {
-        const auto worst = std::max_element(
+        const auto [best, worst] = std::minmax_element(
             result.unknown.begin(), result.unknown.end(),
             [](const OrganUnknown& a, const OrganUnknown& b) { return a.p90_mm < b.p90_mm; });
         std::printf(
-            "left open inside: at worst %s, %.1f mm (median), %.1f mm (90 %%), %.1f mm (95 %%)\n",
-            worst->label.c_str(), worst->median_mm, worst->p90_mm, worst->p95_mm);
+            "left open inside: at worst %s, %.1f mm (median), %.1f mm (90 %%), %.1f mm (95 %%); at "
+            "best %s, %.1f mm (90 %%)\n",
+            worst->label.c_str(), worst->median_mm, worst->p90_mm, worst->p95_mm,
+            best->label.c_str(), best->p90_mm);
         if (worst->p90_with_landmarks_mm > 0 && worst->p90_with_landmarks_mm < worst->p90_mm)
-            std::printf(
-                "two landmarks, one at either end of the body, would bring %s from %.1f to "
-                "%.1f mm (90 %%)\n",
-                worst->label.c_str(), worst->p90_mm, worst->p90_with_landmarks_mm);
+            at_worst = text(", and of %s %.1f of %.1f mm (90 %%)", worst->label.c_str(),
+                            worst->p90_with_landmarks_mm, worst->p90_mm);
     }
     const double with = measure_of(result.report, "interior_with_two_landmarks_mm");
     if (with > 0)
         std::printf(
-            "two landmarks, one at either end of the body, would leave %.1f mm inside "
-            "(root mean square) of %.1f\n",
-            with, measure_of(result.report, "predicted_interior_mm"));
+            "two landmarks, one at either end of the body, would leave %.1f of %.1f mm inside "
+            "(root mean square)%s: `sonocase landmarks` lists places, --landmarks FILE.csv takes "
+            "them\n",
+            with, measure_of(result.report, "predicted_interior_mm"), at_worst.c_str());
     for (const Note& note : result.report.notes) {
         if (note.name == "head") std::printf("head and feet: %s\n", note.text.c_str());
         if (note.name == "handedness") std::printf("right and left: %s\n", note.text.c_str());

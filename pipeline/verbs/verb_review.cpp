@@ -40,6 +40,8 @@ int verb_review(int argc, char** argv) {
         ->capture_default_str();
     app.add_flag("--no-progress", no_progress, "Compare with nothing");
     app.add_flag("--keep", keep, "Put the session into the progress book");
+    options.language = locale_language();
+    app.add_option("--language", options.language, "Of the page: en, de; default: the locale's");
     add_common_options(app, common);
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
     if (no_progress) options.progress_path.clear();
@@ -130,17 +132,18 @@ int verb_score(int argc, char** argv) {
     for (const Message& note : session->notes)
         std::fprintf(stderr, "sonocase score: note: %s\n", note.c_str());
     CaseBundle bundle;
-    std::vector<std::string> warnings;
+    std::vector<Message> warnings;
     if (!a.bundle.empty()) {
         auto loaded = load_bundle(a.bundle);
         if (!loaded) return fail("score", loaded.error());
         bundle = std::move(*loaded);
     }
-    auto exercise = find_review_exercise(bundle, a.exercise, session->header.exercise, warnings);
-    if (!exercise) return fail("score", exercise.error());
+    auto found = find_review_exercise(bundle, a.exercise, session->header.exercise, warnings);
+    if (!found) return fail("score", found.error());
+    Exercise& exercise = found->exercise;
     if (const std::uint64_t seed = attempt_seed(session->header); seed != 0 && !a.bundle.empty()) {
         const CaseAnatomy at_rest(bundle);
-        *exercise = draw_attempt(*exercise, at_rest, bundle.labels, seed).exercise;
+        exercise = draw_attempt(exercise, at_rest, bundle.labels, seed).exercise;
     }
     std::unique_ptr<Anatomy> anatomy;
     if (!a.body.empty()) {
@@ -151,15 +154,14 @@ int verb_score(int argc, char** argv) {
         }
         anatomy = std::make_unique<MeshAnatomy>(std::move(*mesh));
     } else if (!a.bundle.empty()) {
-        anatomy =
-            std::make_unique<CaseAnatomy>(bundle, breathing_shown(*exercise, session->header));
+        anatomy = std::make_unique<CaseAnatomy>(bundle, breathing_shown(exercise, session->header));
     }
     ScoreOptions options;
     ThreadJobs jobs(common.threads);
     options.jobs = &jobs;
     const SessionScore score =
-        score_session(*session, *exercise, anatomy.get(), bundle.labels, options);
-    const std::string json = score_json(score, *exercise);
+        score_session(*session, exercise, anatomy.get(), bundle.labels, options);
+    const std::string json = score_json(score, exercise);
     if (a.json) {
         std::fputs(json.c_str(), stdout);
     } else {

@@ -26,9 +26,9 @@ Result<InputScript> InputScript::load(const std::string& path) {
         const bool fine =
             (verb == "wait" && n == 2) || (verb == "move" && n == 3) ||
             (verb == "wheel" && n == 2) || (verb == "shot" && n == 2) ||
-            (verb == "instructor" && n == 2) || (verb == "press" && n >= 2) ||
-            (verb == "loop" && n == 2) || (verb == "quit" && n == 1) ||
-            (verb == "only-shots" && n == 1) ||
+            (verb == "boxes" && n == 2) || (verb == "instructor" && n == 2) ||
+            (verb == "press" && n >= 2) || (verb == "loop" && n == 2) ||
+            (verb == "quit" && n == 1) || (verb == "only-shots" && n == 1) ||
             ((verb == "down" || verb == "up") && n == 2 && line.words[1].size() == 1 &&
              line.words[1][0] >= '0' && line.words[1][0] <= '2') ||
             (verb == "key" && n >= 2 && key_code(line.words[1]) >= 0) ||
@@ -36,7 +36,7 @@ Result<InputScript> InputScript::load(const std::string& path) {
         if (!fine) {
             return Error{
                 "line not understood: " + text, path + ":" + std::to_string(number),
-                "verbs are wait, key, hold, move, down, up, wheel, press, shot, instructor, "
+                "verbs are wait, key, hold, move, down, up, wheel, press, shot, boxes, instructor, "
                 "only-shots, loop and quit"};
         }
         script.lines_.push_back(std::move(line));
@@ -47,7 +47,7 @@ Result<InputScript> InputScript::load(const std::string& path) {
 
 InjectedInput InputScript::next(double now_s, std::string& shot, bool& quit) {
     input_.wheel = 0;
-    of_instructor_ = false;
+    of_instructor_ = boxes_alone_ = false;
     if (waiting_ > 0) {
         --waiting_;
         return input_;
@@ -96,9 +96,10 @@ InjectedInput InputScript::next(double now_s, std::string& shot, bool& quit) {
         std::string name = line.words[1];
         for (std::size_t i = 2; i < line.words.size(); ++i) name += " " + line.words[i];
         if (find_ && find_(name, input_.x, input_.y)) press_ = 4;
-    } else if (verb == "shot" || verb == "instructor") {
+    } else if (verb == "shot" || verb == "boxes" || verb == "instructor") {
         shot = line.words[1];
         of_instructor_ = verb == "instructor";
+        boxes_alone_ = verb == "boxes";
     } else if (verb == "only-shots") {
         only_shots_ = true;
     } else if (verb == "loop") {

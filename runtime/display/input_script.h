@@ -8,7 +8,8 @@
 //   move X Y            the mouse, in window pixels
 //   down B | up B       button 0 left, 1 right, 2 middle
 //   wheel DY
-//   shot FILE           save the window as PNG
+//   shot FILE           save the window as PNG, and in FILE.boxes where its words and controls are
+//   boxes FILE          save in FILE.boxes alone, without a picture
 //   instructor FILE     save the second window as PNG
 //   only-shots          from here on, the first window draws only the pictures that are saved
 //   press NAME          click the control of that name (DrawnBox), wherever it is
@@ -40,6 +41,8 @@ class InputScript {
     InjectedInput next(double now_s, std::string& shot, bool& quit);
     // Whether the last next() asked for a picture of the second window.
     bool of_instructor() const { return of_instructor_; }
+    // Whether it asked for the boxes alone.
+    bool boxes_alone() const { return boxes_alone_; }
     // Whether pictures that are not saved need not be drawn.
     bool only_shots() const { return only_shots_; }
     // Finds a control by its name and gives its middle in window pixels; false: there is none.
@@ -56,7 +59,7 @@ class InputScript {
     std::size_t next_ = 0;
     int waiting_ = 0;
     InjectedInput input_;
-    bool release_ = false, of_instructor_ = false, only_shots_ = false;
+    bool release_ = false, of_instructor_ = false, boxes_alone_ = false, only_shots_ = false;
     int press_ = 0;  // steps of a press that are still to come
     std::function<bool(const std::string&, float&, float&)> find_;
 };

@@ -7,11 +7,24 @@
 #include <cmath>
 
 namespace sonocase::runtime::inline engine {
+namespace {
+
+// The gain that turns one mean grey into another.
+double gain_between(double from, double to, const GainLaw& law, double range_db) {
+    if (law.exponent <= 0) return (to - from) * range_db / 255;
+    const double exponent =
+        law.range_db > 0 ? law.exponent * law.range_db / range_db : law.exponent;
+    return 20 / exponent *
+           std::log10(std::max(to - law.black, 1.0) / std::max(from - law.black, 1.0));
+}
+
+}  // namespace
 
 void adjust_gain(std::span<const std::uint8_t> pixels,
                  int width_px,
                  const Renderer::Layout& layout,
                  double depth_mm,
+                 const GainLaw& law,
                  ImageSettings& settings) {
     if (width_px <= 0) return;
     const int height_px = static_cast<int>(pixels.size()) / width_px;
@@ -29,7 +42,6 @@ void adjust_gain(std::span<const std::uint8_t> pixels,
         }
     }
     constexpr double kWanted = 95;
-    const double db_per_level = settings.dynamic_range_db / 255;
     double all = 0, n = 0;
     for (std::size_t i = 0; i < 8; ++i) {
         all += sum[i];
@@ -37,11 +49,14 @@ void adjust_gain(std::span<const std::uint8_t> pixels,
     }
     if (n < 1) return;
     const double middle = all / n;
+    const auto gain = [&](double from, double to) {
+        return gain_between(from, to, law, settings.dynamic_range_db);
+    };
     settings.gain_db =
-        std::clamp(settings.gain_db + std::round((kWanted - middle) * db_per_level), -30.0, 30.0);
+        std::clamp(settings.gain_db + std::round(gain(middle, kWanted)), -30.0, 30.0);
     for (std::size_t i = 0; i < 8; ++i) {
         if (count[i] < 50) continue;
-        const double by = (middle - sum[i] / count[i]) * db_per_level;
+        const double by = gain(sum[i] / count[i], middle);
         settings.tgc_db[i] = std::clamp(std::round(settings.tgc_db[i] + 0.5 * by), -20.0, 20.0);
     }
 }

@@ -338,6 +338,10 @@ Renderer::Layout Renderer::layout() const {
     return {g.mm_per_px, g.origin_x_px, g.origin_y_px};
 }
 
+GainLaw Renderer::gain_law() const {
+    return impl_->formation->gain_law();
+}
+
 std::span<const char* const> effect_names(ImageModel model) {
     return info_of(model).effects;
 }

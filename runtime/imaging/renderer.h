@@ -90,6 +90,7 @@ class Renderer {
         double origin_y_px = 0;
     };
     Layout layout() const;
+    GainLaw gain_law() const;
 
   private:
     struct Impl;

@@ -137,11 +137,14 @@ struct SessionRecorder::Impl {
                 frame.fields.push_back({"OriginXPx", number_text(layout.origin_x_px)});
                 frame.fields.push_back({"OriginYPx", number_text(layout.origin_y_px)});
             }
-            pictures.frames.push_back(std::move(frame));
-            const std::size_t bytes =
-                static_cast<std::size_t>(picture.width_px) * picture.height_px;
-            pictures.pixels.insert(pictures.pixels.end(), picture.pixels.begin(),
-                                   picture.pixels.begin() + static_cast<std::ptrdiff_t>(bytes));
+            const auto bytes = static_cast<std::ptrdiff_t>(picture.width_px) * picture.height_px;
+            const auto later = std::upper_bound(
+                pictures.frames.begin(), pictures.frames.end(), frame.timestamp_s,
+                [](double time_s, const SequenceFrame& f) { return time_s < f.timestamp_s; });
+            pictures.pixels.insert(
+                pictures.pixels.begin() + bytes * (later - pictures.frames.begin()),
+                picture.pixels.begin(), picture.pixels.begin() + bytes);
+            pictures.frames.insert(later, std::move(frame));
             const Status saved = save_sequence(pictures, pictures_path(path), true);
             if (!saved) {
                 const std::lock_guard lock(mutex);
@@ -218,7 +221,7 @@ void SessionRecorder::wait_for_room() {
     impl.room.wait(lock, roomy);
 }
 
-void SessionRecorder::push_picture(std::int64_t frame,
+bool SessionRecorder::push_picture(std::int64_t frame,
                                    double time_s,
                                    const char* why,
                                    int width_px,
@@ -227,7 +230,7 @@ void SessionRecorder::push_picture(std::int64_t frame,
                                    const Renderer::Layout& layout) {
     Picture& picture = impl_->picture;
     if (picture.full.load(std::memory_order_acquire) || pixels.size() > picture.pixels.size())
-        return;
+        return false;
     picture.frame = frame;
     picture.time_s = time_s;
     picture.why = why;
@@ -236,6 +239,7 @@ void SessionRecorder::push_picture(std::int64_t frame,
     picture.layout = layout;
     std::copy(pixels.begin(), pixels.end(), picture.pixels.begin());
     picture.full.store(true, std::memory_order_release);
+    return true;
 }
 
 RecorderStatus SessionRecorder::status() const {

@@ -59,9 +59,10 @@ class SessionRecorder {
     // From the frame loop. Never blocks and never allocates; keeps at most 8 events per frame.
     // False if the writer is so far behind that the frame is lost; status() counts those.
     bool push(const RecordedFrame& frame, std::span<const LiveEvent> events);
-    // Keeps the picture of the frame just pushed: grey, # width_px * height_px, copied. If two come
-    // within the time of a write, the second is left out. `why` is a string literal.
-    void push_picture(std::int64_t frame,
+    // Keeps the picture of a frame that was pushed: grey, # width_px * height_px, copied; pictures
+    // are ordered by their times. False, and nothing is kept, while the one before is written.
+    // `why` is a string literal.
+    bool push_picture(std::int64_t frame,
                       double time_s,
                       const char* why,
                       int width_px,

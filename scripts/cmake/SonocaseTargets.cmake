@@ -28,6 +28,7 @@ target_compile_options(sonocase_options INTERFACE
   -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion
   # GCC 12 is wrong about moved strings and variants (its bugs 105651 and 105329); the sanitizers see what it means to see.
   $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds> $<$<CXX_COMPILER_ID:GNU>:-Wno-free-nonheap-object>
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overflow> $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overread>
   -pthread
   # What ccache needs in order to know a precompiled header again.
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<COMPILE_LANGUAGE:CXX>>:-fpch-preprocess>
@@ -74,9 +75,9 @@ endfunction()
 set(SONOCASE_SMALL_OPTIONS $<$<CONFIG:Release>:-Os>)
 
 # sonocase_room(FOLDER [SMALL] [SOURCES ...] [PUBLIC ...] [PRIVATE ...]): the library of one folder; folder a/b becomes
-# target a_b. SMALL: no frame waits for it, and it is compiled for size. PUBLIC and PRIVATE name what it links: other rooms by their folder, third-party libraries by target. A
-# room sees only the headers of the rooms that it links, so the compiler enforces the dependency law and every arrow
-# below it.
+# target a_b. SMALL: no frame waits for it, and it is compiled for size. PUBLIC and PRIVATE name what it links: other rooms
+# by their folder, third-party libraries by target. A room sees only the headers of the rooms that it links, so the compiler
+# enforces the dependency law and every arrow below it.
 function(sonocase_room folder)
   cmake_parse_arguments(arg "SMALL" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   string(REPLACE "/" "_" name "${folder}")

@@ -70,7 +70,7 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
             f"Metadata-Version: 2.1\nName: sonocase\nVersion: {version}\n"
             "Summary: Ultrasound frames, labels and scores of case bundles\n"
             "License: Apache-2.0\nRequires-Python: >=3.9\n"
-            "Requires-Dist: numpy>=1.24\n")
+            "Provides-Extra: data\nRequires-Dist: numpy>=1.24; extra == \"data\"\n")
         for path in sorted(package.rglob("*")):
             if path.is_file():
                 files[str(path.relative_to(package.parent))] = path.read_bytes()

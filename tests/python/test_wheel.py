@@ -21,9 +21,8 @@ def pip(*arguments, **more):
 @pytest.mark.skipif(pip("--version").returncode != 0, reason="no pip")
 def test_pip_installs_a_package_that_renders(small, tmp_path):
     """From the build at hand: what pip would compile anew is the same target with the same options."""
-    done = pip("install", ROOT, "--config-settings", f"build={BIN.parent}", "--no-deps", "--no-index",
-               "--target", tmp_path / "site")
-    assert done.returncode == 0, done.stderr
+    done = pip("install", ROOT, "--config-settings", f"build={BIN.parent}", "--no-index", "--target", tmp_path / "site")
+    assert done.returncode == 0, done.stderr  # with all that it depends on: nothing
     names = {path.name for path in (tmp_path / "site" / "sonocase").iterdir()}
     assert {"__init__.py", "__init__.pyi", "py.typed", "data.py", "domain.py", "environment.py", "pose.py", "pose.pyi"} <= names
     program = f"""
@@ -39,11 +38,11 @@ print(importlib.metadata.version("sonocase"))
                            env={"PYTHONPATH": str(tmp_path / "site")})
     assert f"VERSION {shown.stdout.strip()}" in (ROOT / "CMakeLists.txt").read_text()
     metadata, = (tmp_path / "site").glob("sonocase-*.dist-info/METADATA")
-    assert "Requires-Dist: numpy>=1.24\n" in metadata.read_text()  # 2 as well: nothing is compiled against it
+    # Only data sets and environments need NumPy; 2 as well, nothing is compiled against it.
+    assert 'Requires-Dist: numpy>=1.24; extra == "data"\n' in metadata.read_text()
     # The module is of one Python and of this machine's libraries, and its name promises no more.
     tag, = (line.split(" ")[1] for line in (metadata.parent / "WHEEL").read_text().splitlines() if line.startswith("Tag: "))
     assert tag == f"cp3{sys.version_info.minor}-cp3{sys.version_info.minor}-linux_{platform.machine()}"
-    again = pip("install", ROOT, "--config-settings", f"build={tmp_path}", "--no-deps", "--no-index",
-                "--target", tmp_path / "other")
+    again = pip("install", ROOT, "--config-settings", f"build={tmp_path}", "--no-index", "--target", tmp_path / "other")
     assert again.returncode != 0 and "CMakeCache.txt" in again.stderr + again.stdout
     assert not (tmp_path / "other").exists()

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "formats/files/atomic_file.h"
+#include "formats/text/excerpt.h"
 #include "formats/text/number_text.h"
 #include "pipeline/base/source_checks.h"
 #include "pipeline/base/text.h"
@@ -276,13 +277,8 @@ Result<MeshBody> read_meshes(const std::string& path,
     Collector collector(table, options);
     for (const std::string& file : mesh_files(path)) SONOCASE_TRY_DONE(collector.add_file(file));
     if (!collector.unmapped().empty()) {
-        std::string names;
-        for (std::size_t n = 0; n < std::min<std::size_t>(collector.unmapped().size(), 8); ++n)
-            names += (n > 0 ? ", " : "") + collector.unmapped()[n];
-        if (collector.unmapped().size() > 8)
-            names += " and " + std::to_string(collector.unmapped().size() - 8) + " more";
         return Error{std::to_string(collector.unmapped().size()) +
-                         " nodes have no row in the table: " + names,
+                         " nodes have no row in the table: " + excerpt(collector.unmapped(), 8),
                      table_path, "add rows for them, with the role skip if they are not wanted"};
     }
     MeshBody body;

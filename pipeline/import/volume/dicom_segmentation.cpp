@@ -12,6 +12,7 @@
 #include <map>
 #include <set>
 
+#include "formats/text/excerpt.h"
 #include "formats/text/number_text.h"
 #include "pipeline/base/memory_limit.h"
 #include "pipeline/base/quiet_library.h"
@@ -472,18 +473,17 @@ void for_rows(const Object& object,
     }
 }
 
-// "of 'liver' and 'tumour' 123, ..." of the largest three.
+// "'liver' and 'tumour' 123" of each, the largest first.
 std::string pairs_text(const std::map<std::pair<int, int>, std::uint64_t>& pairs,
                        const std::map<int, std::string>& names) {
     std::vector<std::pair<std::uint64_t, std::pair<int, int>>> order;
     for (const auto& [pair, voxels] : pairs) order.push_back({voxels, pair});
     std::sort(order.rbegin(), order.rend());
-    std::string text;
-    for (std::size_t n = 0; n < std::min<std::size_t>(3, order.size()); ++n)
-        text += (n > 0 ? ", '" : "'") + names.at(order[n].second.first) + "' and '" +
-                names.at(order[n].second.second) + "' " + std::to_string(order[n].first);
-    if (order.size() > 3) text += ", and others";
-    return text;
+    std::vector<std::string> texts;
+    for (const auto& [voxels, pair] : order)
+        texts.push_back("'" + names.at(pair.first) + "' and '" + names.at(pair.second) + "' " +
+                        std::to_string(voxels));
+    return excerpt(texts);
 }
 
 template <class T>

@@ -16,6 +16,7 @@
 
 #include "formats/bundle/stage_files.h"
 #include "formats/files/load_save.h"
+#include "formats/text/excerpt.h"
 #include "formats/text/nearest_name.h"
 #include "pipeline/anatomy/label_table.h"
 #include "pipeline/anatomy/tissue_table.h"
@@ -282,17 +283,14 @@ Status assume_names(const std::string& path,
                     StructureList& list) {
     if (options.names == "none" || find_numbering(options.names) != nullptr) return Done{};
     const Numbering& total = numberings().front();
-    std::string examples;
-    int count = 0;
+    std::vector<std::string> named;
     for (const Structure& s : list.structures) {
         const std::string_view name = total.name(s.entry.value);
         if (s.voxels == 0 || !s.entry.name.empty() || name.empty()) continue;
-        if (++count <= 3)
-            examples +=
-                (count > 1 ? ", " : "") + std::to_string(s.entry.value) + " " + std::string(name);
+        named.push_back(std::to_string(s.entry.value) + " " + std::string(name));
     }
-    if (count == 0) return Done{};
-    if (count > 3) examples += ", ...";
+    if (named.empty()) return Done{};
+    const std::string examples = excerpt(named);
     const BodySummary body = summary_of(list, options.scale);
     Box3 box;
     for (const LabelSummary& label : body.labels) {
@@ -325,7 +323,7 @@ Status assume_names(const std::string& path,
     }
     for (Structure& s : list.structures)
         if (s.entry.name.empty()) s.entry.name = std::string(total.name(s.entry.value));
-    list.assumed_names = count;
+    list.assumed_names = static_cast<int>(named.size());
     list.notes.push_back({"names", "assumed: " + std::string(total.title)});
     if (!fit.misfits.empty()) {
         list.warnings.push_back(source + ": they are taken as " + std::string(total.title) + " (" +

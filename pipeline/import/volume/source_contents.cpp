@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <set>
 
+#include "formats/text/excerpt.h"
 #include "pipeline/anatomy/anatomy_check.h"
 #include "pipeline/base/source_checks.h"
 #include "pipeline/import/volume/dicom_frames.h"
@@ -55,11 +56,9 @@ std::string two_patients(const DicomFolder& folder, const std::string& path) {
 }
 
 std::string paths_below(const std::string& folder, const std::vector<DicomObject>& objects) {
-    constexpr std::size_t kNamed = 3;
-    std::string paths;
-    for (std::size_t n = 0; n < std::min(kNamed, objects.size()); ++n)
-        paths += (n == 0 ? "" : ", ") + path_below(folder, objects[n].path);
-    return objects.size() > kNamed ? paths + ", ..." : paths;
+    std::vector<std::string> paths;
+    for (const DicomObject& object : objects) paths.push_back(path_below(folder, object.path));
+    return excerpt(paths);
 }
 
 Result<SourceContents> dicom_contents(const DicomFolder& folder, const std::string& path) {

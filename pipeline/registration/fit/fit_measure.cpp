@@ -118,6 +118,7 @@ FitMeasure measure_fit(const SkinSurfaceResult& skin,
     const Fans fans(mapped);
     const std::vector<std::uint32_t> readings = thin_target(target, 0);
     std::vector<double> gap(readings.size(), std::numeric_limits<double>::quiet_NaN());
+    std::vector<std::uint8_t> off_skin(readings.size(), 0);
     parallel_for(readings.size(), 64, [&](std::size_t begin, std::size_t end) {
         for (std::size_t n = begin; n < end; ++n) {
             const Point3 p = target.points[readings[n]];
@@ -133,7 +134,7 @@ FitMeasure measure_fit(const SkinSurfaceResult& skin,
                     if (d < best.distance) best = {d, {1 - wb - wc, wb, wc}, fans.triangle[f]};
                 }
             }
-            if (!(best.distance <= kFarthestMm)) continue;
+            if (!std::isfinite(best.distance)) continue;
             const auto& t = mapped.triangles[best.triangle];
             // At an open edge the skin ends: the reading belongs to what lies beyond.
             bool beyond = true;
@@ -145,6 +146,8 @@ FitMeasure measure_fit(const SkinSurfaceResult& skin,
             const bool on_edge =
                 best.weight[0] < 1e-9 || best.weight[1] < 1e-9 || best.weight[2] < 1e-9;
             if (beyond && on_edge) continue;
+            off_skin[n] = best.distance > kOffSkinMm;
+            if (best.distance > kFarthestMm) continue;
             const double cosine = dot(normalized(normal), target.normals[readings[n]]);
             if (cosine < kMinCosine) continue;
             const Point3 nearest = mapped.points[t[0]] +
@@ -155,6 +158,7 @@ FitMeasure measure_fit(const SkinSurfaceResult& skin,
     });
     FitMeasure m;
     m.readings = static_cast<long>(readings.size());
+    m.off_skin = std::count(off_skin.begin(), off_skin.end(), 1);
     std::vector<double> size;
     for (double g : gap) {
         if (std::isfinite(g)) size.push_back(std::abs(g));

@@ -15,6 +15,10 @@
 
 namespace sonocase::pipeline::inline registration_fit {
 
+// A reading farther from the skin than this is of something else: a hand, a table, a sensor that
+// was laid down.
+inline constexpr double kOffSkinMm = 25;
+
 struct FitMeasure {
     double rms_mm = -1, median_mm = -1, p95_mm = -1, max_mm = -1;  // negative: no counterparts
     double mean_signed_mm = 0;  // > 0: the readings lie outside the skin
@@ -25,6 +29,7 @@ struct FitMeasure {
     long readings = 0, counterparts = 0;
     // Near the skin, but farther than the others allow: lift-offs, folds of skin.
     long unexplained = 0;
+    long off_skin = 0;  // farther than kOffSkinMm from the skin, which does not end there
 };
 
 // The mapped skin, mannequin frame relative to the target's origin.

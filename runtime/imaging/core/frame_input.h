@@ -62,6 +62,15 @@ struct ImageSettings {
     friend bool operator==(const ImageSettings&, const ImageSettings&) = default;
 };
 
+// How a picture answers to gain. Power: what a grey has above `black` grows by a factor of
+// 10^(exponent dB / 20). Exponent 0, logarithm: grey grows by 255 dB over the dynamic range.
+struct GainLaw {
+    double black = 0, exponent = 1;
+    // Range at which the exponent holds; at another one it is smaller in the same proportion as
+    // that is wider. 0: the console's range does nothing.
+    double range_db = 0;
+};
+
 // A straight needle as drawn: after calibration and bend constraint.
 struct NeedlePose {
     Point3 tip;         // `mannequin` frame

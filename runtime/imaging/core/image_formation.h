@@ -87,6 +87,7 @@ class ImageFormation {
     // where they are in this frame, `mannequin`. Returns their number.
     using Pools = std::array<SceneChange::Pool, SceneChange::kMaxPools>;
     virtual std::size_t pools_of(const FrameInput&, Pools&) const { return 0; }
+    virtual GainLaw gain_law() const = 0;
     // Fills in what the model found for its last frame.
     virtual void describe(RenderedFrame&) const {}
     // Row of the effect that frames leave out from now on, although it is on; -1: none.

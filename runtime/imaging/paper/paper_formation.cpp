@@ -62,6 +62,8 @@ class PaperFormation final : public ImageFormation {
         fill_costs<PaperEffects, PaperMet>(kPaperEffects, switches_, nullptr, pass_ms, costs);
     }
 
+    GainLaw gain_law() const override { return {}; }  // a factor of the grey
+
   private:
     struct Level {
         std::vector<float> row_gain;      // # samples

@@ -94,6 +94,11 @@ class PhysicalFormation final : public ImageFormation {
         level.reach = ScanReach(geometry, level.tables, scene_.voxel_mm);
     }
 
+    GainLaw gain_law() const override {
+        const MachineGrey& grey = machine_.grey;
+        return {grey.floor, grey.map == GreyMap::log ? 0 : grey.exponent, grey.dynamic_range_db};
+    }
+
     FrameStatus render_fast(int level,
                             const FrameRequest& request,
                             std::span<std::uint8_t> pixels,

@@ -41,11 +41,10 @@ struct TruthRenderer::Impl {
     void planes_of(const FrameInput& input, const TruthPlanes& planes);
     void labels(const TruthPlanes& planes);
     void darken(const TruthRun& run, int begin, int end);
-    void shadows(const TruthPlanes& planes);
+    void beams(const TruthPlanes& planes);
     void count_shadowed(const std::uint8_t* shadowed,
                         const std::uint8_t* labels,
                         std::size_t count);
-    void depths(const TruthPlanes& planes, const TruthRun& run, std::size_t at);
     void facts(const FrameInput& input);
     void needle_facts(const FrameInput& input);
     void target_facts();
@@ -58,7 +57,7 @@ struct TruthRenderer::Impl {
     ScanGeometry geometry;
     TruthPixels pixels;
     PlaneLookUp look_up;
-    PlainTiles tiles;
+    TruthTiles tiles;
     CaseAnatomy anatomy;
     NeedleSight sight;
     NeedleModel needle;
@@ -80,6 +79,9 @@ struct TruthRenderer::Impl {
 namespace {
 
 constexpr float kNoHardMm = 1e9f;
+float per_reach() {
+    return static_cast<float>(1.4426950408889634 / PlaneLookUp::contact_reach_mm());
+}
 constexpr std::uint64_t kEachByte = 0x0101010101010101u;
 
 bool valid_pose(const Rigid& t) {
@@ -110,7 +112,7 @@ TruthRenderer::Impl::Impl(CaseView view,
       pixels(geometry),
       look_up(
           view, exercise, moves.contact, moves.breathing, moves.pulsation, geometry, pixels.rays()),
-      tiles(geometry, pixels, look_up.contact_reach_mm()),
+      tiles(geometry, pixels),
       anatomy(view, moves.breathing ? e.breathing : BreathingMotion{}),
       sight(&anatomy, e),
       needle(e.needle),
@@ -203,11 +205,12 @@ void TruthRenderer::Impl::lay_out_rows(const Rigid& pose) {
         f.beam_z[a] = static_cast<float>(z[a]);
         f.shift_vx[a] = static_cast<float>(look_up.motion().breathing_mm[a] * per_mm);
     }
+    f.most_off_vx = static_cast<float>(kMostOffMm * per_mm);
     voxels.fill(f, region_rows);
     f.pulse_vx = static_cast<float>(look_up.motion().pulse_mm * per_mm);
     region_rows.pulse_vx = f.region_per_voxel * f.pulse_vx;
     f.gap_mm = look_up.contact().any_gap ? look_up.contact().gap_mm.data() : nullptr;
-    f.per_reach = static_cast<float>(1.4426950408889634 / look_up.contact_reach_mm());
+    f.per_reach = per_reach();
     f.fan = geometry.fan;
     f.radius_mm = static_cast<float>(geometry.radius_mm);
     f.mm_per_px = static_cast<float>(px);
@@ -215,6 +218,7 @@ void TruthRenderer::Impl::lay_out_rows(const Rigid& pose) {
     f.origin_y_px = static_cast<float>(geometry.origin_y_px);
     f.press = shown_press;
     f.closed_label = closed_label.data();
+    f.closes = f.press != nullptr && f.press->pressed && f.press->field->closed_nodes().any;
     f.rays = pixels.rays();
     f.lines_per_ray = static_cast<float>(geometry.scanlines) / static_cast<float>(pixels.rays());
     const BreathingLattice* lattice = look_up.breathing();
@@ -229,20 +233,17 @@ void TruthRenderer::Impl::lay_out_rows(const Rigid& pose) {
 
 void TruthRenderer::Impl::labels(const TruthPlanes& planes) {
     const bool dark = !planes.shadowed.empty();
-    std::fill(first_hard_mm.begin(), first_hard_mm.end(), kNoHardMm);
-    tiles.find(simd, rows);
+    tiles.look_up(simd, rows, planes.labels);
+    pixels.set_outside(planes.labels, std::uint8_t{0});
     pixels.for_each_run([&](const TruthRun& run, std::size_t at) {
         std::uint8_t* to = planes.labels.data() + at;
-        for (int n = 0; n < run.count;) {
-            const int label = tiles.label(run.begin + n, run.row);
+        for (int n = 0; n < run.count && tiles.any_one_by_one(run.row);) {
+            const bool one_by_one = tiles.one_by_one(run.begin + n, run.row);
             int end = n;
-            do end += PlainTiles::kColumns - (run.begin + end) % PlainTiles::kColumns;
-            while (end < run.count && tiles.label(run.begin + end, run.row) == label);
+            do end += TruthTiles::kColumns - (run.begin + end) % TruthTiles::kColumns;
+            while (end < run.count && tiles.one_by_one(run.begin + end, run.row) == one_by_one);
             end = std::min(end, run.count);
-            if (label < 0)
-                truth_labels(simd, rows, run, n, end, to);
-            else
-                std::fill(to + n, to + end, static_cast<std::uint8_t>(label));
+            if (one_by_one) truth_labels(simd, rows, run, n, end, to);
             n = end;
         }
         // Runs of one label, mostly long.
@@ -258,73 +259,76 @@ void TruthRenderer::Impl::labels(const TruthPlanes& planes) {
             if (dark && (rows.labels[label] & kHard) != 0) darken(run, n, end);
             n = end;
         }
-        depths(planes, run, at);  // while its rays and depths are at hand
     });
 }
 
 // Makes the rays that hard pixels [begin, end) of a run cover dark from them on.
 void TruthRenderer::Impl::darken(const TruthRun& run, int begin, int end) {
     const int rays = pixels.rays();
+    // So many to each side that no ray between two hard pixels stays bright.
+    const auto beside = [&](float r_mm) {
+        const float away =
+            rows.fan ? std::max(rows.radius_mm + r_mm, 1e-3f) / std::max(rows.radius_mm, 1e-3f)
+                     : 1.0f;
+        return std::max(static_cast<int>(0.5f * pixels.rays_per_px_at_face() / away + 0.499f), 0);
+    };
+    // A row is deepest at one of its ends.
+    const int least = beside(std::max(run.r_mm[begin], run.r_mm[end - 1]));
+    const bool alike =
+        least == beside((static_cast<float>(run.row) - rows.origin_y_px - 0.5f) * rows.mm_per_px);
     for (int n = begin; n < end; ++n) {
         const float r = run.r_mm[n];
-        const int ray = run.ray[n];
-        const float away =
-            rows.fan ? std::max(rows.radius_mm + r, 1e-3f) / std::max(rows.radius_mm, 1e-3f) : 1.0f;
-        // So many to each side that no ray between two hard pixels stays bright.
-        const int half =
-            std::max(static_cast<int>(0.5f * pixels.rays_per_px_at_face() / away + 0.499f), 0);
+        const int ray = run.ray[n], half = alike ? least : beside(r);
         for (int i = std::max(ray - half, 0); i <= std::min(ray + half, rays - 1); ++i)
             first_hard_mm[i] = std::min(first_hard_mm[i], r);
     }
 }
 
-void TruthRenderer::Impl::shadows(const TruthPlanes& planes) {
-    std::fill(planes.shadowed.begin(), planes.shadowed.end(), std::uint8_t{0});
-    std::size_t first = first_hard_mm.size(), end = 0;  // rays that any hard tissue darkens
-    for (std::size_t ray = 0; ray < first_hard_mm.size(); ++ray) {
-        if (!(first_hard_mm[ray] < kNoHardMm)) continue;
-        first = std::min(first, ray);
-        end = ray + 1;
+// Shadows and depths together: both read each pixel's ray.
+void TruthRenderer::Impl::beams(const TruthPlanes& planes) {
+    const bool any_depth = !planes.skin_depth_mm.empty(), any_shadow = !planes.shadowed.empty();
+    if (!any_depth && !any_shadow) return;
+    float shallowest_mm = kNoHardMm;
+    for (float& hard_mm : first_hard_mm) {
+        if (!(hard_mm < kNoHardMm)) continue;
         // The face itself is lit; what lies a pixel behind it is not.
-        first_hard_mm[ray] += static_cast<float>(geometry.mm_per_px);
+        hard_mm += static_cast<float>(geometry.mm_per_px);
+        shallowest_mm = std::min(shallowest_mm, hard_mm);
     }
-    if (first >= end) return;
+    if (any_depth)
+        pixels.set_outside(planes.skin_depth_mm, std::numeric_limits<float>::quiet_NaN());
+    if (any_shadow) pixels.set_outside(planes.shadowed, std::uint8_t{0});
     pixels.for_each_run([&](const TruthRun& run, std::size_t at) {
-        // Rays ascend along a row.
-        const std::uint16_t* low = std::lower_bound(run.ray, run.ray + run.count, first);
-        const std::uint16_t* high = std::lower_bound(low, run.ray + run.count, end);
-        const auto skip = low - run.ray;
-        const TruthRun dark{run.row, run.begin + static_cast<int>(skip),
-                            static_cast<int>(high - low), low, run.r_mm + skip};
-        const std::size_t from = at + static_cast<std::size_t>(skip);
-        truth_shadows(simd, dark, first_hard_mm, planes.shadowed.data() + from);
-        count_shadowed(planes.shadowed.data() + from, planes.labels.data() + from,
-                       static_cast<std::size_t>(dark.count));
+        BeamPlanes beams{nullptr, first_hard_mm.data(), nullptr, look_up.contact().entry_mm.data()};
+        if (any_depth) beams.depth_mm = planes.skin_depth_mm.data() + at;
+        // A row is deepest at one of its ends.
+        const auto count = static_cast<std::size_t>(run.count);
+        const bool dark = any_shadow && std::max(run.r_mm[0], run.r_mm[count - 1]) > shallowest_mm;
+        if (dark) beams.shadowed = planes.shadowed.data() + at;
+        if (dark || any_depth) truth_beams(simd, rows, run, beams);
+        if (dark)
+            count_shadowed(beams.shadowed, planes.labels.data() + at, count);
+        else if (any_shadow)
+            fill_plane(planes.shadowed.subspan(at, count), std::uint8_t{0});
     });
 }
 
 void TruthRenderer::Impl::count_shadowed(const std::uint8_t* shadowed,
                                          const std::uint8_t* labels,
                                          std::size_t count) {
-    for (std::size_t n = 0; n < count; n += 8) {
-        std::uint64_t dark = 0, shown = 0;
-        const std::size_t left = std::min<std::size_t>(8, count - n);
-        std::memcpy(&dark, shadowed + n, left);
+    std::size_t n = 0;
+    for (std::uint64_t dark = 0, shown = 0; n + 8 <= count; n += 8) {
+        std::memcpy(&dark, shadowed + n, 8);
         if (dark == 0) continue;
-        std::memcpy(&shown, labels + n, left);
+        std::memcpy(&shown, labels + n, 8);
         if (dark == kEachByte && shown == kEachByte * labels[n]) {  // true nearly everywhere
             truth.shadowed_pixels_of_label[labels[n]] += 8;
             continue;
         }
-        for (std::size_t i = n; i < n + left; ++i)
+        for (std::size_t i = n; i < n + 8; ++i)
             truth.shadowed_pixels_of_label[labels[i]] += shadowed[i];
     }
-}
-
-void TruthRenderer::Impl::depths(const TruthPlanes& planes, const TruthRun& run, std::size_t at) {
-    if (planes.skin_depth_mm.empty()) return;
-    truth_depths(simd, rows, run, look_up.contact().entry_mm.data(),
-                 planes.skin_depth_mm.data() + at);
+    for (; n < count; ++n) truth.shadowed_pixels_of_label[labels[n]] += shadowed[n];
 }
 
 void TruthRenderer::Impl::planes_of(const FrameInput& input, const TruthPlanes& planes) {
@@ -334,29 +338,23 @@ void TruthRenderer::Impl::planes_of(const FrameInput& input, const TruthPlanes& 
     assert(planes.shadowed.empty() || planes.shadowed.size() == area);
     assert(planes.skin_depth_mm.empty() || planes.skin_depth_mm.size() == area);
     (void)area;
-    if (!planes.skin_depth_mm.empty())
-        pixels.set_outside(planes.skin_depth_mm, std::numeric_limits<float>::quiet_NaN());
-    if (planes.labels.empty()) {
-        if (!planes.skin_depth_mm.empty())
-            pixels.for_each_run(
-                [&](const TruthRun& run, std::size_t at) { depths(planes, run, at); });
-    } else {
+    std::fill(first_hard_mm.begin(), first_hard_mm.end(), kNoHardMm);
+    if (!planes.labels.empty()) {
         ensure_loaded(input.mannequin_from_probe);
-        pixels.set_outside(planes.labels, std::uint8_t{0});
         if (near_enough(bundle->grid, input.mannequin_from_probe, geometry)) {
             labels(planes);
         } else {
-            std::fill(first_hard_mm.begin(), first_hard_mm.end(), kNoHardMm);
-            pixels.for_each_run([&](const TruthRun& run, std::size_t at) {
+            fill_plane(planes.labels, std::uint8_t{0});
+            pixels.for_each_run([&](const TruthRun& run, std::size_t) {
                 truth.pixels_of_label[0] += static_cast<std::uint32_t>(run.count);
-                std::fill_n(planes.labels.data() + at, run.count, std::uint8_t{0});
-                depths(planes, run, at);
             });
         }
-        if (!planes.shadowed.empty()) shadows(planes);
     }
+    TruthPlanes along = planes;
+    if (planes.labels.empty()) along.shadowed = {};
+    beams(along);
     if (!planes.needle.empty()) {
-        std::fill(planes.needle.begin(), planes.needle.end(), std::uint8_t{0});
+        fill_plane(planes.needle, std::uint8_t{0});
         NeedleShape shape;
         if (needle_shape_of(input, shape))
             needle_plane(geometry, pixels, shape, kTipLengthMm, planes.needle);
@@ -425,7 +423,7 @@ PixelTruth TruthRenderer::at(const FrameInput& frame, int column, int row) {
     pixel.rest = m.look_up.rest(p, line, r, gap);
     pixel.label = gap < 0 ? 0 : m.anatomy.label(pixel.rest);
     if (m.look_up.closed(p, line, r)) pixel.label = m.closed_label[pixel.label];
-    pixel.skin_depth_mm = r + std::max(gap, 0.0) * std::exp(-r / m.look_up.contact_reach_mm()) -
+    pixel.skin_depth_mm = r + std::max(gap, 0.0) * std::exp(-r / PlaneLookUp::contact_reach_mm()) -
                           m.look_up.entry_at(ray);
     return pixel;
 }

@@ -223,7 +223,7 @@ void PlaneLookUp::press_entries() {
     }
 }
 
-double PlaneLookUp::contact_reach_mm() const {
+double PlaneLookUp::contact_reach_mm() {
     return physical::kGapReachMm;
 }
 

@@ -75,7 +75,7 @@ class PlaneLookUp {
     const BreathingLattice* breathing() const {
         return motion_.breathes() && !lattice_.weight.empty() ? &lattice_ : nullptr;
     }
-    double contact_reach_mm() const;
+    static double contact_reach_mm();
 
     // Where the tissue that the plane's point p shows is now, and where it lies at rest. gap_mm:
     // gap of its beam.

@@ -9,6 +9,7 @@
 #include "formats/volume/boundary_record.h"
 #include "formats/volume/brick_volume.h"
 #include "formats/volume/tissue.h"
+#include "runtime/imaging/core/needle_shift.h"
 #include "runtime/imaging/physical/model/region_look_up.h"
 #include "runtime/imaging/press/press_view.h"
 
@@ -124,206 +125,122 @@ TruthPixels::TruthPixels(const ScanGeometry& g) : width_px_(g.width_px), rays_(r
     r_mm_.resize(r_mm_.size() + kVectorSlack, 0.0f);
 }
 
-bool TruthPixels::scanned(int column, int row) const {
-    const auto after = std::partition_point(runs_.begin(), runs_.end(), [&](const PixelRun& r) {
-        return r.row < row || (r.row == row && r.end <= column);
-    });
-    return after != runs_.end() && after->row == row && after->begin <= column;
-}
-
-PlainTiles::PlainTiles(const ScanGeometry& g, const TruthPixels& pixels, double reach_mm)
-    : geometry_(g),
+TruthTiles::TruthTiles(const ScanGeometry& g, const TruthPixels& pixels)
+    : width_px_(g.width_px),
       across_((g.width_px + kColumns - 1) / kColumns),
       half_mm_(0.5 * std::hypot(kColumns - 1, kRows - 1) * g.mm_per_px) {
     const int down = (g.height_px + kRows - 1) / kRows;
-    tiles_.resize(static_cast<std::size_t>(across_) * down);
-    label_.assign(tiles_.size(), -1);
+    std::vector<Tile> all(static_cast<std::size_t>(across_) * down);
+    one_by_one_.assign(all.size(), false);
+    any_in_row_.assign(static_cast<std::size_t>(down), false);
+    air_before_.assign(static_cast<std::size_t>(pixels.rays()) + 1, 0);
     pixels.for_each_run([&](const TruthRun& run, std::size_t) {
         for (int n = 0; n < run.count; ++n) {
-            Tile& t = tiles_[static_cast<std::size_t>((run.row / kRows) * across_ +
-                                                      (run.begin + n) / kColumns)];
+            Tile& t = all[static_cast<std::size_t>((run.row / kRows) * across_ +
+                                                   (run.begin + n) / kColumns)];
             t.rays[0] = std::min<int>(t.rays[0], run.ray[n]);
             t.rays[1] = std::max<int>(t.rays[1], run.ray[n]);
-            t.r_mm[0] = std::min(t.r_mm[0], run.r_mm[n]);
-            t.r_mm[1] = std::max(t.r_mm[1], run.r_mm[n]);
+            t.rows = run.row % kRows + 1;
         }
     });
-    for (Tile& t : tiles_)  // a little more and less than exp2_fading(), which is good to 1.1e-4
-        for (const int end : {0, 1})
-            t.fade[end] = static_cast<float>(
-                std::exp(-static_cast<double>(t.r_mm[1 - end]) / reach_mm) * (0.999 + 0.002 * end) -
-                1e-6 * (1 - end));
-    for (std::size_t n = 0; n < tiles_.size(); ++n) lay_beam(n);
-}
-
-void PlainTiles::lay_beam(std::size_t tile) {
-    const ScanGeometry& g = geometry_;
-    const auto n = static_cast<int>(tile);
-    const int first_column = n % across_ * kColumns, first_row = n / across_ * kRows;
-    Tile& t = tiles_[tile];
-    t.x = (first_column + 0.5 * (kColumns - 1) - g.origin_x_px) * g.mm_per_px;
-    t.z = (first_row + 0.5 * (kRows - 1) - g.origin_y_px) * g.mm_per_px;
-    if (!g.fan) return;
-    const double away = std::hypot(t.x, t.z + g.radius_mm);
-    t.any_turn = away < 2 * half_mm_;
-    t.dx = t.x / away;
-    t.dz = (t.z + g.radius_mm) / away;
-    t.turn = half_mm_ / (away - half_mm_);
-}
-
-void PlainTiles::find(SimdTarget simd, const TruthFrameRows& f) {
-    constexpr double kSlackVx = 0.05;  // more than places lose in single precision
-    const double column = 0.5 * (kColumns - 1), row = 0.5 * (kRows - 1);
-    for (int a = 0; a < 3; ++a) beam_vx_[a] = std::hypot(f.beam_x[a], f.beam_z[a]);
-    for (std::size_t n = 0; n < tiles_.size(); ++n) {
-        label_[n] = -1;
-        if (tiles_[n].rays[1] < 0) continue;
-        const auto tile = static_cast<int>(n);
-        const int first_column = tile % across_ * kColumns, first_row = tile / across_ * kRows;
-        Box box;
-        for (int a = 0; a < 3; ++a) {
-            box.middle[a] =
-                f.origin[a] + (first_column + column) * f.across[a] + (first_row + row) * f.down[a];
-            box.half[a] = kSlackVx + column * std::abs(f.across[a]) + row * std::abs(f.down[a]);
+    for (int n = 0; n < static_cast<int>(all.size()); ++n) {
+        Tile& t = all[static_cast<std::size_t>(n)];
+        if (t.rays[1] < 0) continue;
+        t.points.column = n % across_ * kColumns;
+        t.points.row = n / across_ * kRows;
+        const auto place = [&](double column, double row) {
+            return PlanePoint{(t.points.column + column - g.origin_x_px) * g.mm_per_px,
+                              (t.points.row + row - g.origin_y_px) * g.mm_per_px};
+        };
+        t.middle = place(0.5 * (kColumns - 1), 0.5 * (kRows - 1));
+        const double last_ray = std::nextafter(static_cast<float>(pixels.rays() - 1), 0.0f);
+        for (int i = 0; i < TruthTile::kPoints; ++i) {
+            double line = 0, sample = 0;
+            g.locate(place(static_cast<double>(TruthTile::kBeside[i]),
+                           static_cast<double>(TruthTile::kBelow[i])),
+                     line, sample);
+            t.points.ray[i] = static_cast<float>(
+                std::clamp((line + 0.5) / g.scanlines * pixels.rays() - 0.5, 0.0, last_ray));
+            t.points.r_mm[i] = static_cast<float>((sample + 0.5) * g.step_mm);
         }
-        if (!move(simd, f, n, box)) continue;
-        if (f.weight != nullptr) {
-            if (label_in(f, breathed_middle(f, box)) < 0) continue;  // most tiles fail here
-            breathe(f, box);
-        }
-        const int label = label_in(f, box);
-        if (label < 0) continue;
-        if (f.press != nullptr && f.closed_label[label] != label) continue;
-        label_[n] = static_cast<std::int16_t>(label);
+        tiles_.push_back(t);
     }
 }
 
-// Contact and pressing: false where no bound is known.
-bool PlainTiles::move(SimdTarget simd, const TruthFrameRows& f, std::size_t tile, Box& box) const {
-    if (f.gap_mm == nullptr && f.press == nullptr) return true;
-    const Tile& t = tiles_[tile];
-    if (t.any_turn) return false;
-    double along[2] = {0, 0}, side[2] = {0, 0};
-    if (f.gap_mm != nullptr) {
-        const auto [least, most] =
-            std::minmax_element(f.gap_mm + t.rays[0], f.gap_mm + t.rays[1] + 1);
-        if (!(*least >= 0)) return false;  // a beam in air
-        along[0] = std::max(static_cast<double>(*least * t.fade[0]), 0.0);
-        along[1] = static_cast<double>(*most * t.fade[1]);
+void TruthTiles::look_up(SimdTarget simd, const TruthFrameRows& f, std::span<std::uint8_t> labels) {
+    if (f.gap_mm != nullptr)
+        for (int ray = 0; ray < f.rays; ++ray)
+            air_before_[ray + 1] = air_before_[ray] + (f.gap_mm[ray] < 0 ? 1 : 0);
+    std::fill(any_in_row_.begin(), any_in_row_.end(), false);
+    for (const Tile& t : tiles_) {
+        bool found = f.press == nullptr || !bends(*f.press, t);
+        const int in_air =
+            f.gap_mm == nullptr ? 0 : air_before_[t.rays[1] + 1] - air_before_[t.rays[0]];
+        if (in_air > t.rays[1] - t.rays[0])
+            found = fill(t, 0, labels);
+        else
+            found = found && in_air == 0 && look_up_tile(simd, f, t, labels);
+        one_by_one_[static_cast<std::size_t>(t.points.row / kRows * across_ +
+                                             t.points.column / kColumns)] = !found;
+        if (!found) any_in_row_[static_cast<std::size_t>(t.points.row / kRows)] = true;
     }
-    if (f.press != nullptr) {
-        const press::PressView& v = *f.press;
-        if (!v.field->pools().empty()) return false;
-        const NeedleDent& needle = v.field->needle();
-        if (needle.moves() &&
-            std::hypot(t.x - needle.tip.x, t.z - needle.tip.z) < kDentReachMm + half_mm_)
-            return false;
-        if (v.pressed && !v.columns_follow_beams) return false;
-        if (v.pressed) {
-            const int rows = std::min(v.active, v.capacity);
-            const auto node = [&](int ray) {
-                return static_cast<int>(
-                    ((static_cast<float>(ray) + 0.5f) * f.lines_per_ray - 0.5f) /
-                    static_cast<float>(v.every));
-            };
-            const auto sample = [&](float r) { return static_cast<int>(r / v.step_mm - 0.5f); };
-            const PressRange range =
-                press_range(simd, v, std::clamp(node(t.rays[0]) - 1, 0, v.node_stride - 1),
-                            std::clamp(node(t.rays[1]) + 2, 0, v.node_stride - 1),
-                            std::clamp(sample(t.r_mm[0]) - 1, 0, std::max(rows - 2, 0)),
-                            std::clamp(sample(t.r_mm[1]) + 2, 0, std::max(rows - 1, 0)));
-            for (const int end : {0, 1}) {
-                along[end] += static_cast<double>(range.along[end]);
-                side[end] += static_cast<double>(range.side[end]);
-            }
-        }
-    }
-    const double middle = 0.5 * (along[0] + along[1]), beside = 0.5 * (side[0] + side[1]);
-    const double half = 0.5 * (along[1] - along[0]), half_side = 0.5 * (side[1] - side[0]);
-    const double turned = t.turn * (std::abs(middle) + half + std::abs(beside) + half_side);
-    for (int a = 0; a < 3; ++a) {
-        const double u = t.dx * f.beam_x[a] + t.dz * f.beam_z[a],
-                     v = t.dz * f.beam_x[a] - t.dx * f.beam_z[a];
-        box.middle[a] += middle * u + beside * v;
-        box.half[a] += half * std::abs(u) + half_side * std::abs(v) + turned * beam_vx_[a];
-    }
+}
+
+bool TruthTiles::fill(const Tile& t, int label, std::span<std::uint8_t> labels) const {
+    for (int row = 0; row < t.rows; ++row)
+        std::fill_n(first_label(t, labels) + static_cast<std::ptrdiff_t>(row) * width_px_,
+                    columns(t), static_cast<std::uint8_t>(label));
     return true;
 }
 
-// A place that the box, breathed, holds: its middle, moved by the weight of the cell it lies in.
-PlainTiles::Box PlainTiles::breathed_middle(const TruthFrameRows& f, const Box& box) {
-    int node[3];
-    for (int a = 0; a < 3; ++a)
-        node[a] = static_cast<int>(
-            std::clamp((box.middle[a] - f.first_vx[a]) * f.per_voxel, 0.0, f.lattice[a] - 2.0));
-    const double weight =
-        f.weight[(std::ptrdiff_t{node[2]} * f.lattice[1] + node[1]) * f.lattice[0] + node[0]];
-    Box place;
-    for (int a = 0; a < 3; ++a) {
-        place.middle[a] = box.middle[a] - weight * f.shift_vx[a];
-        place.half[a] = 0;
-    }
-    return place;
+// True where what moves a tile has bends that its points may miss.
+bool TruthTiles::bends(const press::PressView& v, const Tile& t) const {
+    if (!v.field->pools().empty()) return true;
+    const NeedleDent& needle = v.field->needle();
+    return needle.moves() && std::hypot(t.middle.x - needle.tip.x, t.middle.z - needle.tip.z) <
+                                 kDentReachMm + half_mm_;
 }
 
-// Breathing: by as much as the least and the greatest weight of the cells that the box meets.
-void PlainTiles::breathe(const TruthFrameRows& f, Box& box) {
+bool TruthTiles::look_up_tile(SimdTarget simd,
+                              const TruthFrameRows& f,
+                              const Tile& t,
+                              std::span<std::uint8_t> labels) const {
+    constexpr float kSlackVx = 0.01f;  // more than places lose in single precision
+    TilePlaces places;
+    if (!truth_places(simd, f, t.points, places)) return false;
+    // The bricks that the places lie in.
     int from[3], to[3];
+    bool inside = true, outside = false, in_region = f.region != nullptr;
     for (int a = 0; a < 3; ++a) {
-        const auto node = [&](double at) {
-            return std::clamp(std::floor((at - f.first_vx[a]) * f.per_voxel), 0.0,
-                              f.lattice[a] - 1.0);
-        };
-        from[a] = std::min(static_cast<int>(node(box.middle[a] - box.half[a])), f.lattice[a] - 2);
-        to[a] = std::min(static_cast<int>(node(box.middle[a] + box.half[a])) + 1, f.lattice[a] - 1);
+        const float low = places.lower[a] - kSlackVx, high = places.upper[a] + kSlackVx;
+        const auto last = static_cast<float>(f.size[a] - 1);
+        inside = inside && low > -0.5f && high < last + 0.5f;
+        outside = outside || high < -0.5f || low > last + 0.5f;
+        in_region = in_region && high >= f.region_lower[a] && low < f.region_upper[a];
+        from[a] = static_cast<int>(std::clamp(low, 0.0f, last) + 0.5f) >> 2;
+        to[a] = static_cast<int>(std::clamp(high, 0.0f, last) + 0.5f) >> 2;
     }
-    const std::ptrdiff_t row = f.lattice[0], plane = row * f.lattice[1];
-    float least = f.weight[from[2] * plane + from[1] * row + from[0]], most = least;
-    for (int k = from[2]; k <= to[2]; ++k)
-        for (int j = from[1]; j <= to[1]; ++j)
-            for (int i = from[0]; i <= to[0]; ++i) {
-                const float weight = f.weight[k * plane + j * row + i];
-                least = std::min(least, weight);
-                most = std::max(most, weight);
-            }
-    for (int a = 0; a < 3; ++a) {
-        box.middle[a] -= 0.5 * (least + most) * f.shift_vx[a];
-        box.half[a] += 0.5 * (most - least) * std::abs(f.shift_vx[a]);
-    }
+    if (outside) return fill(t, 0, labels);
+    if (in_region) return false;
+    const int label = label_of_bricks(f, from, to);
+    if (label >= 0 && (inside || label == 0) && (!f.closes || f.closed_label[label] == label))
+        return fill(t, label, labels);
+    return truth_tile(simd, f, places, inside, t.rows, columns(t), first_label(t, labels),
+                      width_px_);
 }
 
-// The label of all bricks that the box meets, where that is one without surfaces; -1 otherwise.
-int PlainTiles::label_in(const TruthFrameRows& f, const Box& box) {
-    int from[3], to[3];
-    bool leaves = false, outside = false;
-    for (int a = 0; a < 3; ++a) {
-        const double low = box.middle[a] - box.half[a] + 0.5,
-                     high = box.middle[a] + box.half[a] + 0.5;
-        leaves = leaves || low < 0 || high >= f.size[a];
-        outside = outside || high < 0 || low >= f.size[a];
-        from[a] = static_cast<int>(std::clamp(std::floor(low), 0.0, f.size[a] - 1.0)) >> 2;
-        to[a] = static_cast<int>(std::clamp(std::floor(high), 0.0, f.size[a] - 1.0)) >> 2;
-    }
-    if (outside) return 0;
-    if (f.region != nullptr) {
-        bool meets = true;
-        for (int a = 0; a < 3; ++a)
-            meets = meets && box.middle[a] + box.half[a] >= f.region_lower[a] &&
-                    box.middle[a] - box.half[a] < f.region_upper[a];
-        if (meets) return -1;
-    }
+// The label of all bricks of a box, where that is one without surfaces; -1 otherwise.
+int TruthTiles::label_of_bricks(const TruthFrameRows& f, const int from[3], const int to[3]) {
     const auto brick = [&](int i, int j, int k) {
         return f.bricks[k * f.bricks_xy + j * f.bricks_x + i].word;
     };
     const std::uint32_t first = brick(from[0], from[1], from[2]);
     if ((first & (kOneLabel | kHasSurface)) != kOneLabel) return -1;
-    const auto label = static_cast<int>(first & 0xFF);
-    if (leaves && label != 0) return -1;
     for (int k = from[2]; k <= to[2]; ++k)
         for (int j = from[1]; j <= to[1]; ++j)
             for (int i = from[0]; i <= to[0]; ++i)
                 if (brick(i, j, k) != first) return -1;
-    return label;
+    return static_cast<int>(first & 0xFF);
 }
 
 void needle_plane(const ScanGeometry& g,

@@ -51,6 +51,17 @@ class TruthVoxels {
     std::optional<TruthVolume> region_;
 };
 
+// As std::fill(), which takes floats one by one, and bytes by an instruction that is slow to start.
+template <class T>
+void fill_plane(std::span<T> plane, T value) {
+    std::array<T, 64> block;
+    block.fill(value);
+    std::size_t at = 0;
+    for (; at + block.size() <= plane.size(); at += block.size())
+        std::copy(block.begin(), block.end(), plane.data() + at);
+    std::copy_n(block.begin(), plane.size() - at, plane.data() + at);
+}
+
 // The runs of scanned pixels of a picture, and each pixel's ray and depth; made once.
 class TruthPixels {
   public:
@@ -68,23 +79,15 @@ class TruthPixels {
                              static_cast<std::size_t>(run.begin));
         }
     }
-    bool scanned(int column, int row) const;
     // Sets the pixels outside the scanned area, which no run visits.
     template <class T>
     void set_outside(std::span<T> plane, T value) const {
-        std::array<T, 64> block;  // copied whole: std::fill takes numbers one by one
-        block.fill(value);
         std::size_t at = 0;
-        const auto fill_to = [&](std::size_t end) {
-            for (; at + block.size() <= end; at += block.size())
-                std::copy(block.begin(), block.end(), plane.data() + at);
-            std::copy_n(block.begin(), end - at, plane.data() + at);
-        };
         for_each_run([&](const TruthRun& run, std::size_t begin) {
-            fill_to(begin);
+            fill_plane(plane.subspan(at, begin - at), value);
             at = begin + static_cast<std::size_t>(run.count);
         });
-        fill_to(plane.size());
+        fill_plane(plane.subspan(at), value);
     }
 
   private:
@@ -95,47 +98,52 @@ class TruthPixels {
     std::vector<float> r_mm_;
 };
 
-// Tiles of the picture that show one label throughout, a quarter of a torso's: their pixels are not
-// looked up one by one. A tile's places, moved as truth_rows.h moves them, are bounded by a box;
-// where all bricks that the box meets hold one label and no surface, so does the tile. Which tiles
-// are found changes no pixel.
-class PlainTiles {
+// The picture in tiles whose pixels' places follow from those of a few points (TruthTile), so that
+// contact, pressing and breathing are worked out for a sixteenth of the pixels. Where all bricks
+// that a tile's places lie in hold one label and no surface, no pixel is looked up.
+class TruthTiles {
   public:
-    static constexpr int kColumns = 16, kRows = 8;
+    static constexpr int kColumns = TruthTile::kColumns, kRows = TruthTile::kRows;
 
-    PlainTiles(const ScanGeometry& geometry, const TruthPixels& pixels, double contact_reach_mm);
+    TruthTiles(const ScanGeometry& geometry, const TruthPixels& pixels);
 
-    void find(SimdTarget simd, const TruthFrameRows& frame);  // those of a frame
-    // The label that a pixel's tile shows throughout; -1: it may show several.
-    int label(int column, int row) const {
-        return label_[static_cast<std::size_t>((row / kRows) * across_ + column / kColumns)];
+    // Writes a frame's labels of all tiles that have scanned pixels, and of other pixels in them,
+    // but for those tiles whose pixels are to be looked up one by one: where beams are in air,
+    // lumens close, a needle or a pool moves tissue, a fine region lies, or the middle of a cell of
+    // pixels is not where its corners say.
+    void look_up(SimdTarget simd, const TruthFrameRows& frame, std::span<std::uint8_t> labels);
+    bool any_one_by_one(int row) const {
+        return any_in_row_[static_cast<std::size_t>(row / kRows)];
+    }
+    bool one_by_one(int column, int row) const {
+        return one_by_one_[static_cast<std::size_t>((row / kRows) * across_ + column / kColumns)];
     }
 
   private:
     struct Tile {
+        TruthTile points;
         int rays[2] = {1 << 30, -1};  // the least and the greatest of its scanned pixels
-        float r_mm[2] = {1e9f, -1e9f};
-        float fade[2] = {0, 1};  // of the gap that contact closes
-        // Its middle in the scan plane, mm; the beam through it, and how far those of its pixels
-        // turn away from it. any_turn: so near the virtual apex that no bound is known.
-        double x = 0, z = 0, dx = 0, dz = 1, turn = 0;
-        bool any_turn = false;
+        int rows = 0;                 // down to the last with scanned pixels
+        PlanePoint middle{};
     };
-    struct Box {
-        double middle[3], half[3];  // voxels
-    };
-    void lay_beam(std::size_t tile);
-    bool move(SimdTarget simd, const TruthFrameRows& f, std::size_t tile, Box& box) const;
-    static Box breathed_middle(const TruthFrameRows& f, const Box& box);
-    static void breathe(const TruthFrameRows& f, Box& box);
-    static int label_in(const TruthFrameRows& f, const Box& box);
+    bool bends(const press::PressView& view, const Tile& tile) const;
+    int columns(const Tile& t) const { return std::min(kColumns, width_px_ - t.points.column); }
+    std::uint8_t* first_label(const Tile& t, std::span<std::uint8_t> labels) const {
+        return labels.data() + static_cast<std::ptrdiff_t>(t.points.row) * width_px_ +
+               t.points.column;
+    }
+    bool fill(const Tile& tile, int label, std::span<std::uint8_t> labels) const;  // true
+    bool look_up_tile(SimdTarget simd,
+                      const TruthFrameRows& frame,
+                      const Tile& tile,
+                      std::span<std::uint8_t> labels) const;
+    static int label_of_bricks(const TruthFrameRows& frame, const int from[3], const int to[3]);
 
-    const ScanGeometry& geometry_;
-    int across_ = 0;
-    double half_mm_ = 0;      // from a tile's middle to its corners
-    double beam_vx_[3] = {};  // length of the beams' plane along each axis, per mm; of a frame
-    std::vector<Tile> tiles_;
-    std::vector<std::int16_t> label_;
+    int width_px_ = 0, across_ = 0;
+    double half_mm_ = 0;                         // from a tile's middle to its corners
+    std::vector<Tile> tiles_;                    // those with scanned pixels
+    std::vector<char> one_by_one_, any_in_row_;  // of tiles, and of rows of them
+    std::vector<int> air_before_;  // of each ray, and one more: rays in air before it, in a frame
 };
 
 // 1 where the slab shows the needle's shaft, 2 within tip_mm of its tip, 0 elsewhere.

@@ -5,6 +5,7 @@
 #include <hwy/cache_control.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 
 #include "formats/volume/boundary_record.h"
@@ -75,31 +76,26 @@ class RayNumbers {
     bool gathers_ = false;
 };
 
+// Points of the scan plane: where they lie in it, their depth and their ray, as a fraction.
+template <class D>
+struct PlanePoints {
+    hn::Vec<D> x_mm, z_mm, r_mm, ray;
+};
+
 // Contact: moves each point along its beam by gap exp(-r / reach).
 template <class D, class V>
-HWY_INLINE void close_gap(D d,
-                          const TruthFrameRows& f,
-                          const TruthRun& run,
-                          int first,
-                          int used,
-                          V column,
-                          V& air,
-                          Places<D>& p) {
-    const auto r = hn::LoadU(d, run.r_mm + first);
-    const auto gap = RayNumbers<D>(d, run, first, used, f.rays).of(d, f.gap_mm);
-    air = hn::Min(gap, hn::Zero(d));                        // below 0: air
+HWY_INLINE void close_gap(
+    D d, const TruthFrameRows& f, const PlanePoints<D>& at, V gap, Places<D>& p) {
     if (hn::AllFalse(d, hn::Gt(gap, hn::Zero(d)))) return;  // nothing moves
-    const auto shift =
-        hn::Mul(hn::Max(gap, hn::Zero(d)), exp2_fading(d, hn::Mul(r, hn::Set(d, -f.per_reach))));
+    const auto shift = hn::Mul(hn::Max(gap, hn::Zero(d)),
+                               exp2_fading(d, hn::Mul(at.r_mm, hn::Set(d, -f.per_reach))));
     auto along_x = hn::Zero(d), along_z = shift;
     if (f.fan) {
-        const auto away = hn::Max(hn::Add(r, hn::Set(d, f.radius_mm)), hn::Set(d, 1e-3f));
+        const auto radius = hn::Set(d, f.radius_mm);
+        const auto away = hn::Max(hn::Add(at.r_mm, radius), hn::Set(d, 1e-3f));
         const auto part = hn::Div(shift, away);
-        const float z_mm =
-            (static_cast<float>(run.row) - f.origin_y_px) * f.mm_per_px + f.radius_mm;
-        along_x = hn::Mul(
-            part, hn::Mul(hn::Sub(column, hn::Set(d, f.origin_x_px)), hn::Set(d, f.mm_per_px)));
-        along_z = hn::Mul(part, hn::Set(d, z_mm));
+        along_x = hn::Mul(part, at.x_mm);
+        along_z = hn::Mul(part, hn::Add(at.z_mm, radius));
     }
     const auto moved = [&](V v, int axis) HWY_ATTR {
         return hn::Add(v, hn::Add(hn::Mul(along_x, hn::Set(d, f.beam_x[axis])),
@@ -109,30 +105,22 @@ HWY_INLINE void close_gap(D d,
 }
 
 // Pressing: moves each point back to where its tissue lies at rest. closed: 1 in a closed lumen.
-template <class D, class V, class I>
-HWY_NOINLINE void press_back(D d,
-                             const TruthFrameRows& f,
-                             const TruthRun& run,
-                             int first,
-                             V column,
-                             Places<D>& p,
-                             I& closed) {
+template <class D, class I>
+HWY_NOINLINE void press_back(
+    D d, const TruthFrameRows& f, const PlanePoints<D>& at, Places<D>& p, I& closed) {
     namespace lanes = press::HWY_NAMESPACE;
+    using V = hn::Vec<D>;
     const hn::RebindToSigned<D> di;
-    const auto r = hn::LoadU(d, run.r_mm + first);
     const auto half = hn::Set(d, 0.5f);
-    const auto ray = hn::Add(hn::ConvertTo(d, rays_of(d, run, first)), half);
-    const auto x = hn::Mul(hn::Sub(column, hn::Set(d, f.origin_x_px)), hn::Set(d, f.mm_per_px));
-    const auto z = hn::Set(d, (static_cast<float>(run.row) - f.origin_y_px) * f.mm_per_px);
     auto dx = hn::Zero(d), dz = hn::Set(d, 1.0f);
     if (f.fan) {
         const auto radius = hn::Set(d, f.radius_mm);
-        const auto away = hn::Max(hn::Add(r, radius), hn::Set(d, 1e-3f));
-        dx = hn::Div(x, away);
-        dz = hn::Div(hn::Add(z, radius), away);
+        const auto away = hn::Max(hn::Add(at.r_mm, radius), hn::Set(d, 1e-3f));
+        dx = hn::Div(at.x_mm, away);
+        dz = hn::Div(hn::Add(at.z_mm, radius), away);
     }
-    const auto line = hn::Sub(hn::Mul(ray, hn::Set(d, f.lines_per_ray)), half);
-    const lanes::PlaceLanes<D> place{x, z, dx, dz, line, r};
+    const auto line = hn::Sub(hn::Mul(at.ray, hn::Set(d, f.lines_per_ray)), half);
+    const lanes::PlaceLanes<D> place{at.x_mm, at.z_mm, dx, dz, line, at.r_mm};
     const lanes::ShiftLanes<D> shift = lanes::shift_lanes(d, *f.press, place);
     const auto move_x = hn::Add(hn::Mul(shift.along, dx), hn::Mul(shift.side, dz));
     const auto move_z = hn::Sub(hn::Mul(shift.along, dz), hn::Mul(shift.side, dx));
@@ -220,8 +208,11 @@ HWY_INLINE I side_of_surface(D d, const TruthFrameRows& f, I record, I own, cons
     const auto along = hn::Add(hn::Mul(nu, off.x), hn::Add(hn::Mul(nv, off.y), hn::Mul(nz, off.z)));
     auto side = hn::Add(hn::Mul(signed_byte<1>(d, record), hn::Set(d, 1.0f / 48)),
                         hn::Div(along, hn::Sqrt(square)));
-    // Walls of vessels move outwards, seen from both sides of them.
-    if (f.pulse_vx != 0 || f.vein_vx != 0) {
+    // Walls of vessels move outwards, seen from both sides of them. Most points lie farther away
+    // from any surface.
+    const float most_vx = std::max(std::abs(f.pulse_vx), std::abs(f.vein_vx)) * 1.001f;
+    if (most_vx > 0 && !hn::AllFalse(d, hn::And(hn::RebindMask(d, near),
+                                                hn::Le(hn::Abs(side), hn::Set(d, 2 * most_vx))))) {
         const auto first = hn::GatherIndex(di, f.labels, own);
         const auto other = hn::GatherIndex(di, f.labels, second);
         const auto wall = [&](std::int32_t bit, float shift_vx) HWY_ATTR {
@@ -241,13 +232,13 @@ HWY_INLINE I side_of_surface(D d, const TruthFrameRows& f, I record, I own, cons
 }
 
 // The voxels nearest to points: brick and cell in it, and the points relative to the voxels'
-// centres.
+// centres. kInside: all lie in the volume.
 template <class D>
 struct Voxels {
     IntOf<D> brick, cell;
     Places<D> off;
 };
-template <class D>
+template <bool kInside = false, class D>
 HWY_INLINE Voxels<D> voxels_of(D d, const TruthFrameRows& f, const Places<D>& p) {
     const hn::RebindToSigned<D> di;
     using I = IntOf<D>;
@@ -257,17 +248,20 @@ HWY_INLINE Voxels<D> voxels_of(D d, const TruthFrameRows& f, const Places<D>& p)
     const auto hx = hn::Add(p.x, shift), hy = hn::Add(p.y, shift), hz = hn::Add(p.z, shift);
     const I i = hn::Sub(hn::BitCast(di, hx), bits), j = hn::Sub(hn::BitCast(di, hy), bits),
             k = hn::Sub(hn::BitCast(di, hz), bits);
-    // An index is inside where neither it nor what is left to the last one is negative.
-    const auto beyond = [&](I v, int axis) HWY_ATTR {
-        return hn::Or(v, hn::Sub(hn::Set(di, f.size[axis] - 1), v));
-    };
-    const auto inside =
-        hn::Not(hn::Lt(hn::Or(beyond(i, 0), hn::Or(beyond(j, 1), beyond(k, 2))), hn::Zero(di)));
     const auto three = hn::Set(di, 3);
-    const I brick = hn::Add(hn::ShiftRight<2>(i),
-                            hn::Add(hn::Mul(hn::ShiftRight<2>(j), hn::Set(di, f.bricks_x)),
-                                    hn::Mul(hn::ShiftRight<2>(k), hn::Set(di, f.bricks_xy))));
-    return {hn::IfThenElse(inside, brick, hn::Set(di, f.outside)),
+    I brick = hn::Add(hn::ShiftRight<2>(i),
+                      hn::Add(hn::Mul(hn::ShiftRight<2>(j), hn::Set(di, f.bricks_x)),
+                              hn::Mul(hn::ShiftRight<2>(k), hn::Set(di, f.bricks_xy))));
+    if constexpr (!kInside) {
+        // An index is inside where neither it nor what is left to the last one is negative.
+        const auto beyond = [&](I v, int axis) HWY_ATTR {
+            return hn::Or(v, hn::Sub(hn::Set(di, f.size[axis] - 1), v));
+        };
+        const auto inside =
+            hn::Not(hn::Lt(hn::Or(beyond(i, 0), hn::Or(beyond(j, 1), beyond(k, 2))), hn::Zero(di)));
+        brick = hn::IfThenElse(inside, brick, hn::Set(di, f.outside));
+    }
+    return {brick,
             hn::Or(hn::And(i, three), hn::Or(hn::ShiftLeft<2>(hn::And(j, three)),
                                              hn::ShiftLeft<4>(hn::And(k, three)))),
             {hn::Sub(p.x, hn::Sub(hx, shift)), hn::Sub(p.y, hn::Sub(hy, shift)),
@@ -336,15 +330,18 @@ constexpr int kAskEvery = 4;
 inline void ask_for_bricks(const TruthFrameRows& f, const Stretch& s, int begin, int end) {
     for (int n = begin; n < end; n += kAskEvery) hwy::Prefetch(f.bricks + s.brick[n]);
 }
+inline void ask_for_voxel(const TruthFrameRows& f,
+                          std::int32_t word,
+                          std::int32_t boundary,
+                          std::int32_t cell) {
+    const auto at = static_cast<std::uint32_t>(cell);
+    if (word >= 0) hwy::Prefetch(f.label_pool + (static_cast<std::uint32_t>(word) << 4 | at >> 2));
+    if (boundary >= 0)
+        hwy::Prefetch(f.boundary_pool + (static_cast<std::size_t>(boundary) << 6 | at));
+}
 inline void ask_for_voxels(const TruthFrameRows& f, const Stretch& s, int begin, int end) {
-    for (int n = begin; n < end; n += kAskEvery) {
-        const auto cell = static_cast<std::uint32_t>(s.cell[n]);
-        const auto word = static_cast<std::uint32_t>(s.word[n]),
-                   boundary = static_cast<std::uint32_t>(s.boundary[n]);
-        if (s.word[n] >= 0) hwy::Prefetch(f.label_pool + (word << 4 | cell >> 2));
-        if (s.boundary[n] >= 0)
-            hwy::Prefetch(f.boundary_pool + (static_cast<std::size_t>(boundary) << 6 | cell));
-    }
+    for (int n = begin; n < end; n += kAskEvery)
+        ask_for_voxel(f, s.word[n], s.boundary[n], s.cell[n]);
 }
 
 // The label that the fine region holds where it covers a point, and `label` elsewhere.
@@ -388,18 +385,23 @@ void labels_of_run(
             const int used = std::min(lanes, to - first), at = first - from;
             const auto n = hn::Add(iota, hn::Set(d, static_cast<float>(first)));
             const auto column = hn::Add(n, hn::Set(d, static_cast<float>(run.begin)));
+            const PlanePoints<D> point{
+                hn::Mul(hn::Sub(column, hn::Set(d, f.origin_x_px)), hn::Set(d, f.mm_per_px)),
+                hn::Set(d, (static_cast<float>(run.row) - f.origin_y_px) * f.mm_per_px),
+                hn::LoadU(d, run.r_mm + first),
+                hn::Add(hn::ConvertTo(d, rays_of(d, run, first)), hn::Set(d, 0.5f))};
             Places<D> p{hn::Add(base_x, hn::Mul(n, step_x)), hn::Add(base_y, hn::Mul(n, step_y)),
                         hn::Add(base_z, hn::Mul(n, step_z))};
             auto state = hn::Zero(di);
             if (f.gap_mm != nullptr) {
-                auto air = hn::Zero(d);
-                close_gap(d, f, run, first, used, column, air, p);
-                state = hn::IfThenElseZero(hn::RebindMask(di, hn::Lt(air, hn::Zero(d))),
+                const auto gap = RayNumbers<D>(d, run, first, used, f.rays).of(d, f.gap_mm);
+                close_gap(d, f, point, gap, p);
+                state = hn::IfThenElseZero(hn::RebindMask(di, hn::Lt(gap, hn::Zero(d))),
                                            hn::Set(di, kInAir));
             }
             if (f.press != nullptr) {
                 auto closed = hn::Zero(di);
-                press_back(d, f, run, first, column, p, closed);
+                press_back(d, f, point, p, closed);
                 state = hn::Or(
                     state, hn::IfThenElseZero(hn::Gt(closed, hn::Zero(di)), hn::Set(di, kClosed)));
             }
@@ -451,76 +453,193 @@ void labels_of_run(
     }
 }
 
-void range_of_shifts(const press::PressView& v,
-                     int first_node,
-                     int last_node,
-                     int first_sample,
-                     int last_sample,
-                     PressRange& range) {
-    const hn::ScalableTag<float> d;
+// Lanes of a tile's kernels: its points, or half a row of its pixels.
+using TileD = hn::CappedTag<float, TruthTile::kPoints>;
+
+bool places_of_tile(const TruthFrameRows& f, const TruthTile& tile, TilePlaces& places) {
+    const TileD d;
+    const hn::RebindToSigned<TileD> di;
     const int lanes = static_cast<int>(hn::Lanes(d));
-    const auto over = [&](const std::vector<float>& plane, float* ends) HWY_ATTR {
-        const float* corner =
-            plane.data() + static_cast<std::ptrdiff_t>(first_sample) * v.node_stride + first_node;
-        const auto any = hn::Set(d, *corner);
-        auto least = any, most = any;
-        for (int node = first_node; node <= last_node; node += lanes) {
-            const auto in = hn::FirstN(d, static_cast<std::size_t>(last_node - node + 1));
-            const float* from = corner + (node - first_node);
-            for (int k = first_sample; k <= last_sample; ++k, from += v.node_stride) {
-                const auto shift = hn::IfThenElse(in, hn::LoadU(d, from), any);
-                least = hn::Min(least, shift);
-                most = hn::Max(most, shift);
-            }
+    const auto number = [&](float x) HWY_ATTR { return hn::Set(d, x); };
+    for (int n = 0; n < TruthTile::kPoints; n += lanes) {
+        const auto beside = hn::LoadU(d, TruthTile::kBeside + n),
+                   below = hn::LoadU(d, TruthTile::kBelow + n);
+        const auto base = [&](int a) HWY_ATTR {
+            const auto first =
+                static_cast<float>(f.origin[a] + tile.row * f.down[a] + tile.column * f.across[a]);
+            return hn::Add(number(first),
+                           hn::Add(hn::Mul(beside, number(static_cast<float>(f.across[a]))),
+                                   hn::Mul(below, number(static_cast<float>(f.down[a])))));
+        };
+        Places<TileD> p{base(0), base(1), base(2)};
+        const auto ray = hn::LoadU(d, tile.ray + n);
+        const auto whole = hn::Floor(ray);
+        const PlanePoints<TileD> at{
+            hn::Mul(hn::Add(beside, number(static_cast<float>(tile.column) - f.origin_x_px)),
+                    number(f.mm_per_px)),
+            hn::Mul(hn::Add(below, number(static_cast<float>(tile.row) - f.origin_y_px)),
+                    number(f.mm_per_px)),
+            hn::LoadU(d, tile.r_mm + n), hn::Add(ray, number(0.5f))};
+        if (f.gap_mm != nullptr) {
+            const auto left = hn::ConvertTo(di, whole);
+            const auto gap = hn::GatherIndex(d, f.gap_mm, left),
+                       next = hn::GatherIndex(d, f.gap_mm + 1, left);
+            close_gap(d, f, at, hn::Add(gap, hn::Mul(hn::Sub(ray, whole), hn::Sub(next, gap))), p);
         }
-        ends[0] = hn::GetLane(hn::MinOfLanes(d, least));
-        ends[1] = hn::GetLane(hn::MaxOfLanes(d, most));
-    };
-    over(v.along, range.along);
-    over(v.side, range.side);
+        if (f.press != nullptr) {
+            auto closed = hn::Zero(di);
+            press_back(d, f, at, p, closed);
+        }
+        if (f.weight != nullptr) breathe_back(d, f, p);
+        hn::Store(p.x, d, places.voxel[0] + n);
+        hn::Store(p.y, d, places.voxel[1] + n);
+        hn::Store(p.z, d, places.voxel[2] + n);
+    }
+    float off = 0;
+    for (int a = 0; a < 3; ++a) {
+        const float *v = places.voxel[a], *w = v + 3;
+        const float l = v[0] + w[0], m = v[1] + w[1], r = v[2] + w[2];  // halfway down, twice
+        off = std::max({off, std::abs(0.5f * (0.375f * l + 0.75f * m - 0.125f * r) - v[6]),
+                        std::abs(0.5f * (0.375f * r + 0.75f * m - 0.125f * l) - v[7])});
+        // A parabola leaves the span of its points by an eighth of their second difference at most.
+        const float bulge =
+            0.125f * std::max(std::abs(v[0] - 2 * v[1] + v[2]), std::abs(w[0] - 2 * w[1] + w[2]));
+        places.lower[a] = std::min({v[0], v[1], v[2], w[0], w[1], w[2]}) - bulge;
+        places.upper[a] = std::max({v[0], v[1], v[2], w[0], w[1], w[2]}) + bulge;
+    }
+    return off <= f.most_off_vx;
 }
 
-void shadows_of_run(const TruthRun& run,
-                    std::span<const float> first_hard_mm,
-                    std::uint8_t* shadowed) {
+template <bool kInside>
+bool labels_of_tile(const TruthFrameRows& f,
+                    const TilePlaces& places,
+                    int rows,
+                    int columns,
+                    std::uint8_t* labels,
+                    std::ptrdiff_t stride) {
+    constexpr int kColumns = TruthTile::kColumns, kPixels = kColumns * TruthTile::kRows;
+    const TileD d;
+    const hn::RebindToSigned<TileD> di;
+    const hn::Rebind<std::uint8_t, TileD> d8;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    // Places in the first row, and from row to row.
+    HWY_ALIGN float first[3][kColumns], down[3][kColumns];
+    for (int at = 0; at < kColumns; at += lanes) {
+        const auto left = hn::LoadU(d, kTileColumns.left + at),
+                   middle = hn::LoadU(d, kTileColumns.middle + at),
+                   right = hn::LoadU(d, kTileColumns.right + at);
+        for (int a = 0; a < 3; ++a) {
+            const auto row = [&](const float* v) HWY_ATTR {
+                return hn::Add(
+                    hn::Mul(left, hn::Set(d, v[0])),
+                    hn::Add(hn::Mul(middle, hn::Set(d, v[1])), hn::Mul(right, hn::Set(d, v[2]))));
+            };
+            const auto top = row(places.voxel[a]);
+            hn::Store(top, d, first[a] + at);
+            hn::Store(hn::Mul(hn::Sub(row(places.voxel[a] + 3), top),
+                              hn::Set(d, 1.0f / (TruthTile::kRows - 1))),
+                      d, down[a] + at);
+        }
+    }
+    HWY_ALIGN float x[kPixels], y[kPixels], z[kPixels];
+    HWY_ALIGN std::int32_t cell[kPixels], word[kPixels], boundary[kPixels];
+    for (int row = 0, n = 0; row < rows; ++row) {
+        const auto by = hn::Set(d, static_cast<float>(row));
+        for (int at = 0; at < kColumns; at += lanes, n += lanes) {
+            const auto place = [&](int a) HWY_ATTR {
+                return hn::Add(hn::Load(d, first[a] + at), hn::Mul(by, hn::Load(d, down[a] + at)));
+            };
+            const Voxels<TileD> voxels =
+                voxels_of<kInside>(d, f, Places<TileD>{place(0), place(1), place(2)});
+            const Bricks<TileD> bricks = bricks_of(d, f, voxels.brick);
+            hn::Store(voxels.off.x, d, x + n);
+            hn::Store(voxels.off.y, d, y + n);
+            hn::Store(voxels.off.z, d, z + n);
+            hn::Store(voxels.cell, di, cell + n);
+            hn::Store(bricks.word, di, word + n);
+            hn::Store(bricks.boundary, di, boundary + n);
+            if (row % 2 == 0) ask_for_voxel(f, word[n], boundary[n], cell[n]);
+        }
+    }
+    for (int row = 0, n = 0; row < rows; ++row, labels += stride) {
+        for (int at = 0; at < kColumns; at += lanes, n += lanes) {
+            const auto label = labels_of(
+                d, f, Bricks<TileD>{hn::Load(di, word + n), hn::Load(di, boundary + n)},
+                hn::Load(di, cell + n),
+                Places<TileD>{hn::Load(d, x + n), hn::Load(d, y + n), hn::Load(d, z + n)});
+            if (f.closes &&
+                !hn::AllTrue(di, hn::Eq(label, hn::GatherIndex(di, f.closed_label, label))))
+                return false;
+            const auto bytes = hn::DemoteTo(d8, label);
+            if (at + lanes <= columns) {
+                hn::StoreU(bytes, d8, labels + at);
+            } else if (at < columns) {
+                HWY_ALIGN std::uint8_t rest[kMaxLanes];
+                hn::Store(bytes, d8, rest);
+                std::copy_n(rest, columns - at, labels + at);
+            }
+        }
+    }
+    return true;
+}
+
+bool labels_of_inner_tile(const TruthFrameRows& f,
+                          const TilePlaces& places,
+                          int rows,
+                          int columns,
+                          std::uint8_t* labels,
+                          std::ptrdiff_t stride) {
+    return labels_of_tile<true>(f, places, rows, columns, labels, stride);
+}
+bool labels_of_outer_tile(const TruthFrameRows& f,
+                          const TilePlaces& places,
+                          int rows,
+                          int columns,
+                          std::uint8_t* labels,
+                          std::ptrdiff_t stride) {
+    return labels_of_tile<false>(f, places, rows, columns, labels, stride);
+}
+
+void beams_of_run(const TruthFrameRows& frame, const TruthRun& of, const BeamPlanes& into) {
+    // Copies, which no write to a plane can change, stay in registers.
+    const TruthRun run = of;
+    const BeamPlanes planes = into;
+    const float* gaps = frame.gap_mm;
+    const float per_reach = -frame.per_reach;
+    const int rays = frame.rays;
     const hn::ScalableTag<float> d;
     const hn::RebindToSigned<decltype(d)> di;
     const hn::Rebind<std::uint8_t, decltype(d)> d8;
     const int lanes = static_cast<int>(hn::Lanes(d));
-    const int rays = static_cast<int>(first_hard_mm.size());
     for (int first = 0; first < run.count; first += lanes) {
         const int used = std::min(lanes, run.count - first);
-        const auto dark = RayNumbers(d, run, first, used, rays).of(d, first_hard_mm.data());
-        const auto behind = hn::Gt(hn::LoadU(d, run.r_mm + first), dark);
-        HWY_ALIGN std::uint8_t bytes[kMaxLanes];
-        hn::Store(hn::DemoteTo(d8, hn::IfThenElseZero(hn::RebindMask(di, behind), hn::Set(di, 1))),
-                  d8, bytes);
-        std::copy_n(bytes, used, shadowed + first);
-    }
-}
-
-void depths_of_run(const TruthFrameRows& f,
-                   const TruthRun& run,
-                   const float* entry_mm,
-                   float* depth_mm) {
-    const hn::ScalableTag<float> d;
-    const int lanes = static_cast<int>(hn::Lanes(d));
-    for (int first = 0; first < run.count; first += lanes) {
         const auto r = hn::LoadU(d, run.r_mm + first);
-        const RayNumbers ray(d, run, first, std::min(lanes, run.count - first), f.rays);
-        auto depth = hn::Sub(r, ray.of(d, entry_mm));
-        if (f.gap_mm != nullptr) {
-            const auto gap = hn::Max(ray.of(d, f.gap_mm), hn::Zero(d));
-            if (!hn::AllFalse(d, hn::Gt(gap, hn::Zero(d))))
-                depth = hn::Add(depth,
-                                hn::Mul(gap, exp2_fading(d, hn::Mul(r, hn::Set(d, -f.per_reach)))));
+        const RayNumbers ray(d, run, first, used, rays);
+        if (planes.shadowed != nullptr) {
+            const auto behind = hn::RebindMask(di, hn::Gt(r, ray.of(d, planes.first_hard_mm)));
+            const auto bytes = hn::DemoteTo(d8, hn::IfThenElseZero(behind, hn::Set(di, 1)));
+            if (used == lanes) {
+                hn::StoreU(bytes, d8, planes.shadowed + first);
+            } else {
+                HWY_ALIGN std::uint8_t rest[kMaxLanes];
+                hn::Store(bytes, d8, rest);
+                std::copy_n(rest, used, planes.shadowed + first);
+            }
         }
-        if (first + lanes <= run.count) {
-            hn::StoreU(depth, d, depth_mm + first);
+        if (planes.depth_mm == nullptr) continue;
+        auto depth = hn::Sub(r, ray.of(d, planes.entry_mm));
+        if (gaps != nullptr) {
+            const auto gap = hn::Max(ray.of(d, gaps), hn::Zero(d));
+            if (!hn::AllFalse(d, hn::Gt(gap, hn::Zero(d))))
+                depth =
+                    hn::Add(depth, hn::Mul(gap, exp2_fading(d, hn::Mul(r, hn::Set(d, per_reach)))));
+        }
+        if (used == lanes) {
+            hn::StoreU(depth, d, planes.depth_mm + first);
         } else {
             HWY_ALIGN float rest[kMaxLanes];
             hn::Store(depth, d, rest);
-            std::copy_n(rest, run.count - first, depth_mm + first);
+            std::copy_n(rest, used, planes.depth_mm + first);
         }
     }
 }
@@ -532,9 +651,10 @@ HWY_AFTER_NAMESPACE();
 namespace sonocase::runtime {
 
 HWY_EXPORT(labels_of_run);
-HWY_EXPORT(range_of_shifts);
-HWY_EXPORT(shadows_of_run);
-HWY_EXPORT(depths_of_run);
+HWY_EXPORT(places_of_tile);
+HWY_EXPORT(labels_of_inner_tile);
+HWY_EXPORT(labels_of_outer_tile);
+HWY_EXPORT(beams_of_run);
 
 void truth_labels(SimdTarget simd,
                   const TruthFrameRows& frame,
@@ -545,31 +665,32 @@ void truth_labels(SimdTarget simd,
     HWY_DISPATCH_TABLE(labels_of_run)[simd.index](frame, run, begin, end, labels);
 }
 
-PressRange press_range(SimdTarget simd,
-                       const press::PressView& view,
-                       int first_node,
-                       int last_node,
-                       int first_sample,
-                       int last_sample) {
-    PressRange range;
-    HWY_DISPATCH_TABLE(range_of_shifts)
-    [simd.index](view, first_node, last_node, first_sample, last_sample, range);
-    return range;
-}
-
-void truth_shadows(SimdTarget simd,
-                   const TruthRun& run,
-                   std::span<const float> first_hard_mm,
-                   std::uint8_t* shadowed) {
-    HWY_DISPATCH_TABLE(shadows_of_run)[simd.index](run, first_hard_mm, shadowed);
-}
-
-void truth_depths(SimdTarget simd,
+bool truth_places(SimdTarget simd,
                   const TruthFrameRows& frame,
-                  const TruthRun& run,
-                  const float* entry_mm,
-                  float* depth_mm) {
-    HWY_DISPATCH_TABLE(depths_of_run)[simd.index](frame, run, entry_mm, depth_mm);
+                  const TruthTile& tile,
+                  TilePlaces& places) {
+    return HWY_DISPATCH_TABLE(places_of_tile)[simd.index](frame, tile, places);
+}
+
+bool truth_tile(SimdTarget simd,
+                const TruthFrameRows& frame,
+                const TilePlaces& places,
+                bool inside,
+                int rows,
+                int columns,
+                std::uint8_t* labels,
+                std::ptrdiff_t stride) {
+    return inside ? HWY_DISPATCH_TABLE(labels_of_inner_tile)[simd.index](frame, places, rows,
+                                                                         columns, labels, stride)
+                  : HWY_DISPATCH_TABLE(labels_of_outer_tile)[simd.index](frame, places, rows,
+                                                                         columns, labels, stride);
+}
+
+void truth_beams(SimdTarget simd,
+                 const TruthFrameRows& frame,
+                 const TruthRun& run,
+                 const BeamPlanes& planes) {
+    HWY_DISPATCH_TABLE(beams_of_run)[simd.index](frame, run, planes);
 }
 
 }  // namespace sonocase::runtime

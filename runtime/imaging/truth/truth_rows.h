@@ -4,8 +4,8 @@
 // set.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <span>
 
 #include "runtime/imaging/core/simd_target.h"
 #include "runtime/imaging/press/press_view.h"
@@ -29,6 +29,7 @@ struct TruthFrameRows {
     // A pixel's voxel: origin + column * across + row * down; in double, rounded once per row.
     double origin[3], across[3], down[3];
     std::int32_t size[3];
+    float most_off_vx = 0;  // kMostOffMm
 
     // Voxels of the bundle. bricks: x fastest, and one more for all places outside. The pools and
     // boundary_uniform are BrickVolume's.
@@ -55,7 +56,8 @@ struct TruthFrameRows {
 
     // Tissue that moves under probe and needle; null: none does.
     const press::PressView* press = nullptr;
-    const std::int32_t* closed_label = nullptr;  // # labels: the label shown where a lumen closed
+    const std::int32_t* closed_label = nullptr;  // # 256: the label shown where a lumen closed
+    bool closes = false;                         // any does
     float lines_per_ray = 1;
     int rays = 0;  // at least 64
 
@@ -65,16 +67,61 @@ struct TruthFrameRows {
     float first_vx[3], per_voxel = 0, shift_vx[3];
 };
 
-// The least and greatest of the probe's shifts over some nodes and samples of a press view, mm.
-struct PressRange {
-    float along[2], side[2];
+// 16 x 8 pixels whose places all follow from those of six points, by parabolas along the rows and
+// straight lines between them. Two points more tell how far off that is.
+struct TruthTile {
+    static constexpr int kColumns = 16, kRows = 8, kPoints = 8;
+    // Of the points, in pixels from the tile's first.
+    static constexpr float kBeside[kPoints] = {0, 7.5f, 15, 0, 7.5f, 15, 3.75f, 11.25f},
+                           kBelow[kPoints] = {0, 0, 0, 7, 7, 7, 3.5f, 3.5f};
+    int column = 0, row = 0;  // its first pixel
+    // Of the points: ray, as a fraction that is 0 in the middle of the first and less than the last
+    // ray's number, and depth along the beam.
+    float ray[kPoints], r_mm[kPoints];
 };
-PressRange press_range(SimdTarget simd,
-                       const press::PressView& view,
-                       int first_node,
-                       int last_node,
-                       int first_sample,
-                       int last_sample);
+
+// Weights of a row's points in each of its columns.
+struct TileColumns {
+    float left[TruthTile::kColumns], middle[TruthTile::kColumns], right[TruthTile::kColumns];
+};
+inline constexpr TileColumns kTileColumns = [] {
+    TileColumns w{};
+    for (int n = 0; n < TruthTile::kColumns; ++n) {
+        const float t = 2.0f * static_cast<float>(n) / (TruthTile::kColumns - 1);
+        w.left[n] = 0.5f * (t - 1) * (t - 2);
+        w.middle[n] = t * (2 - t);
+        w.right[n] = 0.5f * t * (t - 1);
+    }
+    return w;
+}();
+
+// Where the points of a tile are looked up, voxels, and a box of the places of all its pixels.
+struct TilePlaces {
+    alignas(32) float voxel[3][TruthTile::kPoints];
+    float lower[3], upper[3];
+};
+// The places of a tile's pixels follow where those of its last two points do to within this: a
+// sixteenth of a pixel of 512 across a torso, and one step in which a boundary record of a voxel of
+// 1 mm holds where its surface lies.
+inline constexpr double kMostOffMm = 0.02;
+
+// True where the places of all pixels follow from those of the points.
+bool truth_places(SimdTarget simd,
+                  const TruthFrameRows& frame,
+                  const TruthTile& tile,
+                  TilePlaces& places);
+
+// Writes the labels of a tile's pixels, scanned or not; a row of labels is `stride` long. inside:
+// all places lie in the volume. False where a lumen may be closed, which the pixels' own places
+// tell.
+bool truth_tile(SimdTarget simd,
+                const TruthFrameRows& frame,
+                const TilePlaces& places,
+                bool inside,
+                int rows,
+                int columns,
+                std::uint8_t* labels,
+                std::ptrdiff_t stride);
 
 // One run of pixels.
 struct TruthRun {
@@ -91,17 +138,16 @@ void truth_labels(SimdTarget simd,
                   int end,
                   std::uint8_t* labels);
 
-// shadowed[i] = r > first_hard_mm[ray].
-void truth_shadows(SimdTarget simd,
-                   const TruthRun& run,
-                   std::span<const float> first_hard_mm,
-                   std::uint8_t* shadowed);
-
-// depth = r + gap exp(-r / reach) - entry; see TruthPlanes::skin_depth_mm.
-void truth_depths(SimdTarget simd,
-                  const TruthFrameRows& frame,
-                  const TruthRun& run,
-                  const float* entry_mm,
-                  float* depth_mm);
+// What follows from a pixel's beam and depth alone; see TruthPlanes. Of a run; null: not wanted.
+struct BeamPlanes {
+    std::uint8_t* shadowed = nullptr;  // r > first_hard_mm[ray]
+    const float* first_hard_mm = nullptr;
+    float* depth_mm = nullptr;  // r + gap exp(-r / reach) - entry_mm[ray]
+    const float* entry_mm = nullptr;
+};
+void truth_beams(SimdTarget simd,
+                 const TruthFrameRows& frame,
+                 const TruthRun& run,
+                 const BeamPlanes& planes);
 
 }  // namespace sonocase::runtime

@@ -24,6 +24,7 @@
 #include "runtime/player/session/clock.h"
 #include "runtime/player/session/frame_server.h"
 #include "runtime/player/session/session_run.h"
+#include "runtime/player/words/words.h"
 #include "runtime/recording/session_words.h"
 
 namespace sonocase::runtime::inline player_app {
@@ -531,11 +532,20 @@ Status show_review(const std::string& session,
     const std::string out = folder.string() + ".review";
     // One shell with the names as arguments, never as text: they may hold anything.
     const char* script =
-        "\"$1\" review \"$2\" --case \"$3\" -o \"$4\" ${5:+--exercise \"$5\"} && exec xdg-open "
+        "\"$1\" review \"$2\" --case \"$3\" -o \"$4\" --language \"$5\" ${6:+--exercise \"$6\"} && "
+        "exec xdg-open "
         "\"$4/review.html\"";
-    const char* arguments[] = {
-        "sh",           "-c",        script,           "sh",   program.c_str(), session.c_str(),
-        bundle.c_str(), out.c_str(), exercise.c_str(), nullptr};
+    const char* arguments[] = {"sh",
+                               "-c",
+                               script,
+                               "sh",
+                               program.c_str(),
+                               session.c_str(),
+                               bundle.c_str(),
+                               out.c_str(),
+                               language_in_use().code.c_str(),
+                               exercise.c_str(),
+                               nullptr};
     pid_t child = 0;
     const int failed =
         posix_spawnp(&child, "sh", nullptr, nullptr, const_cast<char* const*>(arguments), environ);

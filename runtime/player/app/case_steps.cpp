@@ -78,6 +78,17 @@ void rebuild_engine(PlayerState& player, CaseState& loaded, Console& console, bo
                             std::move(doppler));
 }
 
+namespace {
+
+// Gain 0 and even depth gain, at which an exercise is bright as it should be: nobody begins with
+// what somebody else set for another body.
+void level_gain(ImageSettings& image) {
+    image.gain_db = 0;
+    image.tgc_db = {};
+}
+
+}  // namespace
+
 void close_bundle(PlayerState& player, CaseState& loaded, ScanState& scan) {
     if (loaded.scan) {
         finish_attempt(player, loaded, scan);
@@ -147,6 +158,7 @@ void choose_exercise(PlayerState& player, CaseState& loaded, ScanState& scan, in
     loaded.engine.image.focus_mm = exercise.probe.focus_mm;
     scan.training.targets_reached.assign(exercise.targets.size(), false);
     ++loaded.exercise_number;
+    level_gain(scan.console.controls.settings);
     scan.console.controls.settings.doppler = player.arguments.doppler;
     scan.console.doppler_aimed = player.arguments.box_given || player.arguments.gate_given;
     scan.console.keeps_spectral_scale = player.arguments.spectral_scale_given;
@@ -265,14 +277,13 @@ void choose_preset(PlayerState& player,
                    const ImagePreset& preset) {
     loaded.engine.image.depth_mm = preset.depth_mm;
     loaded.engine.image.focus_mm = preset.focus_mm;
-    console.controls.settings.gain_db = 0;
-    console.controls.settings.tgc_db = {};
+    level_gain(console.controls.settings);
     rebuild_engine(player, loaded, console);
 }
 
 void adjust_gain(const ScanFrame& frame, ImageSettings& image) {
     if (frame.width_px <= 0 || frame.status != FrameStatus::rendered) return;
-    adjust_gain(frame.pixels, frame.width_px, frame.layout, frame.depth_mm, image);
+    adjust_gain(frame.pixels, frame.width_px, frame.layout, frame.depth_mm, frame.gain_law, image);
 }
 
 void check_bundle(CaseState& loaded, Notices& notices) {

@@ -238,6 +238,7 @@ void ScanThread::describe(ScanFrame& out, double now_s) const {
     out.reading = reading_;
     if (engine_->procedure().given()) out.procedure = engine_->procedure().view();
     out.layout = engine_->renderer().layout();
+    out.gain_law = engine_->renderer().gain_law();
     out.depth_mm = engine_->exercise().probe.depth_mm;
     out.focus_mm = engine_->exercise().probe.focus_mm;
     out.accuracy = engine_->renderer().accuracy();

@@ -80,9 +80,7 @@ Settings load_settings(const std::string& path, std::string& warning) {
     take(in, "window_height_px", s.window_height_px);
     take(in, "ui_scale", s.ui_scale);
     take(in, "tracker", s.tracker);
-    take(in, "gain_db", s.gain_db);
     take(in, "dynamic_range_db", s.dynamic_range_db);
-    take(in, "tgc_db", s.tgc_db);
     take(in, "show_3d", s.show_3d);
     take(in, "show_exercise", s.show_exercise);
     take(in, "sound", s.sound);
@@ -102,10 +100,7 @@ Settings load_settings(const std::string& path, std::string& warning) {
     s.needle_sensor = std::clamp(s.needle_sensor, -1, 15);
     s.reference_sensor = std::clamp(s.reference_sensor, -1, 15);
     limit(s.ui_scale, 0, 4);
-    limit(s.gain_db, -30, 30);
     limit(s.dynamic_range_db, 30, 100);
-    s.tgc_db.resize(8, 0.0);
-    for (double& value : s.tgc_db) limit(value, -20, 20);
     if (s.recent.size() > kMaxRecent) s.recent.resize(kMaxRecent);
     return s;
 }
@@ -115,9 +110,7 @@ Status save_settings(const Settings& s, const std::string& path) {
                       {"window_height_px", s.window_height_px},
                       {"ui_scale", s.ui_scale},
                       {"tracker", s.tracker},
-                      {"gain_db", s.gain_db},
                       {"dynamic_range_db", s.dynamic_range_db},
-                      {"tgc_db", s.tgc_db},
                       {"show_3d", s.show_3d},
                       {"show_exercise", s.show_exercise},
                       {"sound", s.sound},

@@ -25,9 +25,7 @@ struct Settings {
     int window_width_px = 1280, window_height_px = 720;
     double ui_scale = 0;  // 0: from the monitor
     std::string tracker = "mouse";
-    double gain_db = 0;
     double dynamic_range_db = 60;
-    std::vector<double> tgc_db = std::vector<double>(8, 0.0);
     bool show_3d = true, show_exercise = true;
     bool sound = true;                 // tones, and the flow in the spectral mode
     std::string trainee;               // signed in last; empty: none

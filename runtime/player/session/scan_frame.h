@@ -54,6 +54,7 @@ struct ScanFrame {
     DopplerFrame doppler;
     TrackerReading reading;
     Renderer::Layout layout;
+    GainLaw gain_law;
     double depth_mm = 0, focus_mm = 0;
     Renderer::Accuracy accuracy;
     std::array<EffectCost, kMaxEffects> costs{};

@@ -42,7 +42,6 @@ const char* picture_reason(std::span<const LiveEvent> events) {
             case LiveEventKind::no_go_contact: return "no_go_contact";
             case LiveEventKind::needle_entry: return "needle_entry";
             case LiveEventKind::target_scanned: return "target_scanned";
-            case LiveEventKind::needle_exit: return "needle_exit";
             default: break;
         }
     }
@@ -59,7 +58,9 @@ SessionRun::SessionRun(const OpenCase& open, const ScanEngine& engine, std::stri
       layout_(engine.renderer().layout()),
       exercise_(engine.exercise()),
       path_(std::move(path)),
-      monitor_(exercise_, anatomy_.get(), open.bundle->labels) {}
+      monitor_(exercise_, anatomy_.get(), open.bundle->labels) {
+    make_room();
+}
 
 Result<std::unique_ptr<SessionRun>> SessionRun::start(const std::string& path,
                                                       const OpenCase& open,
@@ -121,10 +122,45 @@ std::span<const LiveEvent> SessionRun::observe(const FrameRecord& record,
                                 layout_);
     }
     last_ = record;
+    follow_deepest(events, pixels);
     return events;
 }
 
+void SessionRun::follow_deepest(std::span<const LiveEvent> events,
+                                std::span<const std::uint8_t> pixels) {
+    constexpr double kDeeperMm = 0.5;  // a slow advance is not copied at every frame
+    Deepest& d = deepest_;
+    for (const LiveEvent& event : events) {
+        if (event.kind == LiveEventKind::needle_exit) d.due = d.depth_mm > 0;
+        if (event.kind == LiveEventKind::needle_entry) d.inserted = true;
+    }
+    if (d.due) push_deepest();
+    const double depth_mm = monitor_.depth_mm();
+    if (d.due || depth_mm < d.depth_mm + kDeeperMm || pixels.size() > d.pixels.size()) return;
+    d.depth_mm = depth_mm;
+    d.time_s = last_.input.time_s;
+    d.frame = last_.input.frame;
+    d.width_px = width_px_;
+    d.height_px = height_px_;
+    d.layout = layout_;
+    std::copy(pixels.begin(), pixels.end(), d.pixels.begin());
+}
+
+void SessionRun::push_deepest() {
+    Deepest& d = deepest_;
+    const auto size = static_cast<std::size_t>(d.width_px) * static_cast<std::size_t>(d.height_px);
+    d.due = !recorder_->push_picture(d.frame, d.time_s, "deepest", d.width_px, d.height_px,
+                                     std::span(d.pixels).first(size), d.layout);
+    if (d.due) return;  // the writer is busy with another; at the next frame again
+    d.inserted = false;
+    d.depth_mm = 0;
+}
+
 Result<SessionScore> SessionRun::finish() {
+    if (deepest_.inserted || deepest_.due) {  // the needle stays in, or has just come out
+        recorder_->wait_for_room();
+        push_deepest();
+    }
     SONOCASE_TRY_DONE(recorder_->finish());
     // The file as it is goes before the session is scored: of eight hours it is a gigabyte.
     SONOCASE_TRY(const auto session, [&]() -> Result<Session> {

@@ -56,6 +56,7 @@ class SessionRun {
         width_px_ = width_px;
         height_px_ = height_px;
         layout_ = layout;
+        make_room();
     }
 
     // Live values for the screen.
@@ -71,7 +72,25 @@ class SessionRun {
     const Message& not_kept() const { return not_kept_; }
 
   private:
+    // The picture at the deepest point of an insertion, which is known to be that only when the
+    // needle goes back.
+    struct Deepest {
+        bool inserted = false, due = false;  // due: the needle is out, the picture not yet stored
+        double depth_mm = 0, time_s = 0;
+        std::int64_t frame = 0;
+        int width_px = 0, height_px = 0;
+        Renderer::Layout layout;
+        std::vector<std::uint8_t> pixels;  // as many as the largest picture so far has
+    };
+
     SessionRun(const OpenCase& open, const ScanEngine& engine, std::string path);
+    void follow_deepest(std::span<const LiveEvent> events, std::span<const std::uint8_t> pixels);
+    void push_deepest();
+    void make_room() {
+        const auto size =
+            static_cast<std::size_t>(width_px_) * static_cast<std::size_t>(height_px_);
+        if (deepest_.pixels.size() < size) deepest_.pixels.resize(size);
+    }
 
     const OpenCase& open_;
     std::shared_ptr<const Anatomy> anatomy_;
@@ -84,6 +103,7 @@ class SessionRun {
     ImageSettings settings_;
     bool first_ = true;
     FrameRecord last_;
+    Deepest deepest_;
     Message not_kept_;
 };
 

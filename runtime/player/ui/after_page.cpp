@@ -90,15 +90,6 @@ float draw_verdict(Ui& ui, const Box& box, const AttemptResult& result, int hint
     return 68;
 }
 
-const char* missed_words(const std::string& why) {
-    return why == "too_early"      ? "Too early"
-           : why == "too_late"     ? "Too late"
-           : why == "happened"     ? "It happened"
-           : why == "wrong_answer" ? "Answered wrongly"
-           : why == "not_answered" ? "Not answered"
-                                   : "Not done";
-}
-
 // Of an item or a step in the language in use; the name, if the exercise does not have it any more.
 template <class Texts>
 std::string title_in(const Texts& texts, const std::string& name) {
@@ -354,10 +345,10 @@ void draw_results(Ui& ui,
         ui.button("all", {foot.x, foot.y, ui.width(tr(all), Type::body) + 48, 44}, tr(all), style))
         page.all_measures = !page.all_measures;
     if (page.all_measures) room.take_top(draw_all_measures(ui, room, *training.score));
-    for (const std::string& warning : training.score->warnings)
-        room.take_top(
-            ui.paragraph({room.x, room.y, room.w, 60}, warning, Type::small, colour::kWarn, true),
-            4);
+    for (const Message& warning : training.score->warnings)
+        room.take_top(ui.paragraph({room.x, room.y, room.w, 60}, tr_message(warning), Type::small,
+                                   colour::kWarn, true),
+                      4);
     ui.unclip();
     const double over = std::max(0.0f, room.y - top - inside.h);
     ui.scroll_by_wheel(card, page.scroll, over);

@@ -74,8 +74,9 @@ TaskCardRequest draw_task_card(Ui& ui, const Box& card, const TaskCardInput& inp
 inline constexpr int kTrayKeys = 8;
 // "J", "Ctrl + J": of the i-th act on the tray (tray_now()), i < kTrayKeys.
 const char* tray_key(int i);
-// The button alone, where the layout keeps it outside the card. True: pressed.
-bool draw_attempt_button(Ui& ui, const Box& box, const TaskCardInput& input);
+// The button alone, where the layout keeps it outside the card. with_clock: of the attempt. True:
+// pressed.
+bool draw_attempt_button(Ui& ui, const Box& box, const TaskCardInput& input, bool with_clock);
 
 struct ConsoleInput {
     const ImageChoice& image;

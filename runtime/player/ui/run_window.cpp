@@ -36,9 +36,7 @@ void ask_to_end(int) {
 }
 
 void apply_settings(const Settings& settings, ScanControls& controls) {
-    controls.settings.gain_db = settings.gain_db;
     controls.settings.dynamic_range_db = settings.dynamic_range_db;
-    for (std::size_t i = 0; i < 8; ++i) controls.settings.tgc_db[i] = settings.tgc_db[i];
 }
 
 void report(const Status& done) {
@@ -260,7 +258,8 @@ void PlayerWindow::show_picture(const PictureClock& clock) {
         input = script_.next(now_s, shot, quit);
         if (script_.of_instructor()) instructor_shot.swap(shot);
     }
-    display.small_view.saved = !shot.empty();
+    const bool pictured = !shot.empty() && !script_.boxes_alone();
+    display.small_view.saved = pictured;
     window.begin_frame(input);
     const bool fresh = loaded.scan->refresh();
     if (fresh || view.hover.outlines != was_outlined_)
@@ -298,7 +297,7 @@ void PlayerWindow::show_picture(const PictureClock& clock) {
     if (arguments.frames > 0 && shown_ >= arguments.frames) quit = true;
     const bool last = quit || window.should_close();
     const double drawn_s = steady_seconds();
-    const bool saved = !shot.empty() || (last && !arguments.screenshot.empty());
+    const bool saved = pictured || (last && !arguments.screenshot.empty());
     if (script_.only_shots() && !saved) {
         window.end_frame_unseen();
     } else {
@@ -309,7 +308,7 @@ void PlayerWindow::show_picture(const PictureClock& clock) {
                    1e3 * (steady_seconds() - drawn_s));
     }
     if (!shot.empty()) {
-        Status written = save_screenshot(window, shot);
+        Status written = pictured ? save_screenshot(window, shot) : Status(Done{});
         if (written) written = write_boxes(ui_, shot);
         if (!written) notices.error(written.error().message());
     }
@@ -323,9 +322,7 @@ void PlayerWindow::show_picture(const PictureClock& clock) {
 void PlayerWindow::keep_settings() {
     const ScanControls& controls = scan_.console.controls;
     Settings& s = player_.settings;
-    s.gain_db = controls.settings.gain_db;
     s.dynamic_range_db = controls.settings.dynamic_range_db;
-    for (std::size_t i = 0; i < 8; ++i) s.tgc_db[i] = controls.settings.tgc_db[i];
     if (player_.arguments.tracker.empty()) s.tracker = scan_.tracker.spec;
     if (!player_.settings_file.empty()) report(save_settings(s, player_.settings_file));
 }

@@ -232,7 +232,7 @@ void show_task(const SessionView& session,
         .labels = loaded.open->bundle->labels};
     TaskCardRequest wanted;
     if (shows_card) wanted = draw_task_card(ui, card, input);
-    if (!finish.empty() && draw_attempt_button(ui, finish, input))
+    if (!finish.empty() && draw_attempt_button(ui, finish, input, true))
         (input.replays ? wanted.end_replay : wanted.toggle_attempt) = true;
     if (wanted.next_hint) requests.push_back(request::NextHint{});
     if (wanted.toggle_attempt) requests.push_back(request::ToggleAttempt{});

@@ -14,7 +14,7 @@
 namespace sonocase::runtime::inline player_ui {
 namespace {
 
-constexpr float kRow = 28;
+constexpr float kRow = 28, kSmallBelow = 8, kNeedleHigh = 44;
 
 const char* const kSteps[] = {"Find the target", "Bring the needle into the plane",
                               "Advance with the tip in view", "Stop in the middle"};
@@ -82,13 +82,11 @@ std::string hint_words(const TaskCardInput& input) {
                                      : input.texts.hints[input.hints_shown - 1];
 }
 
-float hint_head(const TaskCardInput& input) {
-    return shown_procedure(input) ? 30.0f : 44.0f;
-}
+constexpr float kHintHead = 30;
 
 float hint_height(const Ui& ui, float width, const TaskCardInput& input) {
     const std::string words = hint_words(input);
-    return hint_head(input) +
+    return kHintHead +
            (words.empty() ? 0 : ui.paragraph_height(width - 20, words, Type::small) + 10);
 }
 
@@ -145,8 +143,8 @@ float kept_free(const Ui& ui, float width, const TaskCardInput& input) {
 // Small words where they fit whole.
 void draw_small(Ui& ui, Box& room, const std::string& words, float free) {
     const float high = ui.paragraph_height(room.w, words, Type::small);
-    if (high + 8 + free > room.h) return;
-    ui.paragraph(room.take_top(high, 8), words, Type::small, colour::kDim);
+    if (high + kSmallBelow + free > room.h) return;
+    ui.paragraph(room.take_top(high, kSmallBelow), words, Type::small, colour::kDim);
 }
 
 void draw_steps(Ui& ui, Box& room, const TaskCardInput& input) {
@@ -236,6 +234,33 @@ void draw_step_tab(Ui& ui, const Box& tab, int number, StepState state) {
     }
 }
 
+// The step to be done now; null: all are over.
+const ExerciseTexts::Step* present_step_words(const TaskCardInput& input) {
+    const int step = input.procedure->present_step;
+    return step < 0 ? nullptr : &input.texts.steps[static_cast<std::size_t>(step)];
+}
+
+std::string step_title(const TaskCardInput& input) {
+    const ExerciseTexts::Step* step = present_step_words(input);
+    return step            ? step->title
+           : input.replays ? tr("The procedure is over")
+                           : tr("All steps are behind you: finish the attempt");
+}
+
+constexpr float kTabsHigh = 28, kTabsBelow = 6, kTitleBelow = 4;
+constexpr float kComplicationHigh = 22, kComplicationBelow = 2;
+
+// What stands below the present step: what was done, and what went wrong.
+float done_high(const Ui& ui, float width, const TaskCardInput& input) {
+    const ProcedureState& state = input.procedure->state;
+    const std::string done = done_words(input, state);
+    float sum = done.empty() ? 0 : ui.paragraph_height(width, done, Type::small) + kSmallBelow;
+    if (input.exam && !input.replays) return sum;
+    for (const double seconds : state.complication_s)
+        if (seconds >= 0) sum += kComplicationHigh + kComplicationBelow;
+    return sum;
+}
+
 // The steps of a procedure: which are done, and what is to be done now.
 void draw_procedure_steps(Ui& ui, Box& room, const TaskCardInput& input) {
     const ProcedureView& view = *input.procedure;
@@ -243,7 +268,7 @@ void draw_procedure_steps(Ui& ui, Box& room, const TaskCardInput& input) {
     if (count == 0 || room.h < 30) return;
     constexpr int kMaxTabs = 10;
     if (count <= kMaxTabs) {
-        const Box tabs = room.take_top(28, 6);
+        const Box tabs = room.take_top(kTabsHigh, kTabsBelow);
         for (int i = 0; i < count; ++i)
             draw_step_tab(ui, tabs.column(i, count, 4), i + 1,
                           view.steps[static_cast<std::size_t>(i)]);
@@ -253,33 +278,124 @@ void draw_procedure_steps(Ui& ui, Box& room, const TaskCardInput& input) {
                        count),
                 Type::small, colour::kDim);
     }
-    const bool over = view.present_step < 0;
-    const ExerciseTexts::Step* step =
-        over ? nullptr : &input.texts.steps[static_cast<std::size_t>(view.present_step)];
-    const std::string title =
-        over ? tr(input.replays ? "The procedure is over"
-                                : "All steps are behind you: finish the attempt")
-             : step->title;
+    const ExerciseTexts::Step* step = present_step_words(input);
+    const std::string title = step_title(input);
     const float high = std::min(ui.paragraph_height(room.w, title, Type::bold), 40.0f);
     // A hint that was asked for says more of this step than its title.
-    const float free =
-        input.exam || hint_words(input).empty() ? 0 : below_values(ui, room.w, input);
+    float free = done_high(ui, room.w, input);
+    if (!input.exam && !hint_words(input).empty()) free += below_values(ui, room.w, input);
     if (room.h < high + free) return;
-    ui.paragraph(room.take_top(high, 4), title, Type::bold, colour::kText, true);
-    if (!over) draw_small(ui, room, step->instruction, free);
+    ui.paragraph(room.take_top(high, kTitleBelow), title, Type::bold, colour::kText, true);
+    if (step) draw_small(ui, room, step->instruction, free);
+}
+
+constexpr float kAskHigh = 28;  // of the link to a question that was put off
+
+// What a procedure's card shows above its tray when it cuts nothing: steps, the present one in
+// words, what was done, the hint.
+float whole_standing(const Ui& ui, float width, const TaskCardInput& input, bool instructs) {
+    float sum = done_high(ui, width, input);
+    if (next_question(input.exercise.procedure, input.procedure->state) >= 0) sum += kAskHigh + 4;
+    if (input.exam) return sum;
+    if (!input.texts.steps.empty()) {
+        const ExerciseTexts::Step* step = present_step_words(input);
+        sum += kTabsHigh + kTabsBelow + kTitleBelow +
+               ui.paragraph_height(width, step_title(input), Type::bold);
+        if (instructs && step && !step->instruction.empty())
+            sum += ui.paragraph_height(width, step->instruction, Type::small) + kSmallBelow;
+    }
+    return sum + 4 + hint_height(ui, width, input) + 8;
+}
+
+struct TrayRows {
+    int rows = 0;
+    float high = 38, between = 6;
+    float whole() const { return static_cast<float>(rows) * (high + between) - between + 8; }
+};
+
+// Lower rows where the room is too small for full ones below everything else.
+TrayRows tray_rows(float room_high, float standing, int cells) {
+    TrayRows tray{(cells + 1) / 2};
+    standing = std::max(standing, 108.0f);
+    for (const float high : {30.0f, 28.0f}) {
+        if (tray.rows == 0 || tray.whole() + standing <= room_high) break;
+        tray.high = high;
+        tray.between = high - 26;
+    }
+    return tray;
+}
+
+int tray_cells(const TaskCardInput& input) {
+    return static_cast<int>(tray_now(input.exercise.procedure, input.procedure->state).size()) +
+           (input.mouse ? 1 : 0);
+}
+
+// What the card's head shows: the title, which the bar above the picture says too; attempt and
+// clock, which the button takes over.
+struct Head {
+    bool title = true, attempt = true;
+    bool low = false;  // the card has no room for whole hints
+};
+constexpr float kAttemptHigh = 22, kBelowAttempt = 8;
+
+float title_high(const Ui& ui, float width, const TaskCardInput& input) {
+    return std::min(ui.paragraph_height(width, input.texts.title, Type::heading),
+                    2 * ui.line_height(Type::heading) + 1);
+}
+
+// What the card of an attempt without a procedure shows below its head when it cuts nothing.
+float whole_task(const Ui& ui, float width, const TaskCardInput& input, bool described) {
+    const auto high = [&](const std::string& words, Type type) {
+        return ui.paragraph_height(width, words, type);
+    };
+    float sum = kNeedleHigh + 8 + kept_free(ui, width, input);
+    if (described) sum += high(input.texts.description, Type::small) + kSmallBelow;
+    if (input.exam) return sum + (input.mouse ? high(tr(kAllKeys), Type::small) + kSmallBelow : 0);
+    const int now = present_step(input);
+    sum += kTabsHigh + kTabsBelow + kTitleBelow +
+           high(tr(now < 4 ? kSteps[now] : "All targets reached"), Type::bold);
+    return sum + (input.mouse && now < 4 ? high(tr(kStepKeys[now]), Type::small) + kSmallBelow : 0);
+}
+
+// As much of the head as leaves room for the task and its hint, whole. room: above the button.
+Head head_of(const Ui& ui, const Box& room, const TaskCardInput& input) {
+    constexpr float kLowCard = 300;  // question or tray of a procedure need all of it
+    if (!shown_procedure(input)) {
+        if (!input.attempt || input.replays || input.guide) return {};
+        for (const bool described : {true, false}) {
+            const float left = room.h - whole_task(ui, room.w, input, described);
+            if (title_high(ui, room.w, input) + 4 + kAttemptHigh + kBelowAttempt <= left) return {};
+            if (kAttemptHigh + kBelowAttempt <= left) return {false, true};
+            if (left >= 0) return {false, false};
+        }
+        return {};
+    }
+    if (room.h <= kLowCard) return {false, false, true};
+    if (next_question(input.exercise.procedure, input.procedure->state, input.put_off) >= 0)
+        return {};
+    const float attempt = kAttemptHigh + kBelowAttempt;
+    const int cells = tray_cells(input);
+    for (const bool instructs : {true, false}) {
+        const float standing = whole_standing(ui, room.w, input, instructs);
+        const auto fits = [&](float head) {
+            return head + standing + tray_rows(room.h - head, standing, cells).whole() <= room.h;
+        };
+        if (fits(title_high(ui, room.w, input) + 4 + attempt)) return {};
+        if (fits(attempt)) return {false, true};
+        if (fits(0)) return {false, false};
+    }
+    return {false, false, true};
 }
 
 // What lies ready, two to a row from the bottom up; the needle of the mouse first.
-void draw_tray(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
+void draw_tray(
+    Ui& ui, Box& room, const TaskCardInput& input, const TrayRows& rows, TaskCardRequest& request) {
     const std::vector<TrayAct> tray = tray_now(input.exercise.procedure, input.procedure->state);
     const int needle = input.mouse ? 1 : 0;
     const int cells = static_cast<int>(tray.size()) + needle;
     if (cells == 0) return;
-    const int rows = (cells + 1) / 2;
-    const bool low = static_cast<float>(rows) * 44 + 110 > room.h;
-    const float high = low ? 30 : 38, between = low ? 4 : 6;
-    const float whole = static_cast<float>(rows) * (high + between) - between;
-    Box place = room.take_bottom(whole, 8);
+    const float high = rows.high, between = rows.between;
+    Box place = room.take_bottom(rows.whole() - 8, 8);
     for (int cell = 0; cell < cells; ++cell) {
         const int line = cell / 2;
         const float down = static_cast<float>(line) * (high + between);
@@ -366,7 +482,7 @@ void draw_standing(Ui& ui, Box& room, const TaskCardInput& input) {
     if (!done.empty()) draw_small(ui, room, done, 0);
     for (std::size_t k = 0; tells && k < state.complication_s.size(); ++k) {
         if (state.complication_s[k] < 0 || room.h < 24) continue;
-        const Box line = room.take_top(22, 2);
+        const Box line = room.take_top(kComplicationHigh, kComplicationBelow);
         ui.icon(Icon::warn, line.x, line.y + 2, 18, colour::kBad);
         ui.text({line.x + 24, line.y, line.w - 24, line.h}, tr(complication_titles()[k]),
                 Type::small, colour::kBad, Align::left, true);
@@ -374,19 +490,19 @@ void draw_standing(Ui& ui, Box& room, const TaskCardInput& input) {
 }
 
 // Hints asked for so far, the last one in full; where that does not fit, one line and a button.
-void draw_hints(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
+void draw_hints(
+    Ui& ui, Box& room, const TaskCardInput& input, bool may_cut, TaskCardRequest& request) {
     const int count = static_cast<int>(input.texts.hints.size());
-    if (room.h < hint_head(input)) return;
+    if (room.h < kHintHead) return;
     const std::string words = hint_words(input);
     const float high = std::min(hint_height(ui, room.w, input), room.h);
     Box card = room.take_top(high, 8);
     ui.card(card, "hint", colour::kRaised);
-    Box head = card.take_top(hint_head(input));
+    Box head = card.take_top(kHintHead);
     ui.icon(Icon::hint, head.x + 10, head.y + 0.5f * head.h - 9, 18, colour::kDim);
-    const std::string line =
-        input.hints_shown == 0
-            ? filled(tr("%d hints"), count + 1)
-            : filled(tr("Hint %d of %d"), std::min(input.hints_shown, count + 1), count + 1);
+    const int shown = std::min(input.hints_shown, count + 1);
+    std::string line = shown == 0 ? filled(tr("%d hints"), count + 1)
+                                  : filled(tr("Hint %d of %d"), shown, count + 1);
     if (input.hints_shown <= count) {
         ButtonStyle style;
         style.link = true;
@@ -396,33 +512,39 @@ void draw_hints(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& 
         const float wide = ui.width(tr(next), Type::body) + 44;
         request.next_hint = ui.button("hint", head.take_right(wide), tr(next), style);
     }
+    if (shown > 0 && ui.width(line, Type::small) > head.w - 34)
+        line = filled("%d / %d", shown, count + 1);
     ui.text({head.x + 34, head.y, head.w - 34, head.h}, line, Type::small, colour::kDim,
             Align::left, true);
     if (!words.empty() && card.h > 18)
         ui.paragraph({card.x + 10, card.y, card.w - 20, card.h - 2}, words, Type::small,
-                     colour::kText, true);
+                     colour::kText, may_cut);
 }
 
 // The card while a procedure runs.
-void draw_procedure(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
+void draw_procedure(
+    Ui& ui, Box& room, const TaskCardInput& input, bool low, TaskCardRequest& request) {
     const Procedure& procedure = input.exercise.procedure;
     const ProcedureState& state = input.procedure->state;
     const int question = next_question(procedure, state, input.put_off);
     if (question >= 0) return draw_question(ui, room, input, question, request);
+    const TrayRows rows =
+        tray_rows(room.h, whole_standing(ui, room.w, input, true), tray_cells(input));
     if (next_question(procedure, state) >= 0) {  // was put off
         ButtonStyle style;
         style.link = true;
         const char* words = "A question waits";
-        if (ui.button("ask", room.take_top(28, 4).take_left(ui.width(tr(words), Type::body) + 16),
+        if (ui.button("ask",
+                      room.take_top(kAskHigh, 4).take_left(ui.width(tr(words), Type::body) + 16),
                       tr(words), style))
             request.put_off = -1;
     }
-    draw_tray(ui, room, input, request);  // before the steps: without it nothing can be done
+    draw_tray(ui, room, input, rows, request);  // before the steps: without it nothing can be done
     draw_standing(ui, room, input);
     draw_values(ui, room, input);
     if (input.exam) return;
     room.take_top(4);
-    draw_hints(ui, room, input, request);
+    draw_hints(ui, room, input, low, request);
 }
 
 void draw_guide(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
@@ -454,18 +576,18 @@ const char* attempt_words(int difficulty) {
                               : "Attempt %d · much harder";
 }
 
-void draw_head(Ui& ui, Box& room, const TaskCardInput& input) {
+void draw_head(Ui& ui, Box& room, const TaskCardInput& input, const Head& head) {
     const Exercise& exercise = input.exercise;
-    const std::string& title = input.texts.title;
-    const float line = ui.line_height(Type::heading);
-    const float high = std::min(ui.paragraph_height(room.w, title, Type::heading), 2 * line + 1);
-    ui.paragraph(room.take_top(high, 4), title, Type::heading, colour::kText, true);
+    if (head.title)
+        ui.paragraph(room.take_top(title_high(ui, room.w, input), 4), input.texts.title,
+                     Type::heading, colour::kText, true);
+    if (!head.attempt) return;
     const std::string words =
         input.attempt && input.difficulty != 0
             ? filled(tr(attempt_words(input.difficulty)), input.attempt_number)
             : filled(tr("Attempt %d · difficulty %d of 5"), input.attempt_number,
                      exercise.difficulty);
-    Box second = room.take_top(22, 8);
+    Box second = room.take_top(kAttemptHigh, kBelowAttempt);
     if (input.attempt) {
         const std::string time = clock_words(input.attempt->view().seconds);
         const Box clock = second.take_right(ui.width(time, Type::bold) + 28);
@@ -483,7 +605,7 @@ const char* tray_key(int i) {
     return kKeys[i];
 }
 
-bool draw_attempt_button(Ui& ui, const Box& box, const TaskCardInput& input) {
+bool draw_attempt_button(Ui& ui, const Box& box, const TaskCardInput& input, bool with_clock) {
     ButtonStyle style;
     style.primary = true;
     style.key = input.replays ? "P" : "B";
@@ -496,8 +618,7 @@ bool draw_attempt_button(Ui& ui, const Box& box, const TaskCardInput& input) {
                         : input.attempt ? "Finish attempt"
                                         : "Start attempt";
     std::string shown = tr(words);
-    if (input.attempt && !input.shows_finish)
-        shown += " · " + clock_words(input.attempt->view().seconds);
+    if (input.attempt && with_clock) shown += " · " + clock_words(input.attempt->view().seconds);
     return ui.button("attempt", box, shown, style);
 }
 
@@ -505,15 +626,16 @@ TaskCardRequest draw_task_card(Ui& ui, const Box& card, const TaskCardInput& inp
     TaskCardRequest request;
     ui.card(card, "task");
     Box room = card.inset(12);
+    const Box button = input.shows_finish ? room.take_bottom(48, 8) : Box{};
+    const Head head = head_of(ui, room, input);
     if (input.shows_finish) {
-        const bool pressed = draw_attempt_button(ui, room.take_bottom(48, 8), input);
+        const bool pressed = draw_attempt_button(ui, button, input, !head.attempt);
         (input.replays ? request.end_replay : request.toggle_attempt) = pressed;
     }
-    constexpr float kLowCard = 300;  // question or tray of a procedure need all of it
-    if (!shown_procedure(input) || room.h > kLowCard) draw_head(ui, room, input);
+    draw_head(ui, room, input, head);
     if (!input.replays && !shown_procedure(input) && room.h > 150 &&
         (input.mouse || !input.attempt)) {
-        Box links = room.take_bottom(44, 8);
+        Box links = room.take_bottom(kNeedleHigh, 8);
         ButtonStyle style;
         if (input.has_result && !input.attempt) {
             style.icon = Icon::review;
@@ -550,7 +672,7 @@ TaskCardRequest draw_task_card(Ui& ui, const Box& card, const TaskCardInput& inp
         return request;
     }
     if (shown_procedure(input)) {
-        draw_procedure(ui, room, input, request);
+        draw_procedure(ui, room, input, head.low, request);
         return request;
     }
     if (input.attempt && !input.exam && room.h > 150) draw_steps(ui, room, input);
@@ -575,7 +697,7 @@ TaskCardRequest draw_task_card(Ui& ui, const Box& card, const TaskCardInput& inp
                      Type::small, colour::kDim, true);
     } else if (input.attempt) {
         room.take_top(4);
-        draw_hints(ui, room, input, request);
+        draw_hints(ui, room, input, true, request);
     }
     return request;
 }

@@ -2,12 +2,7 @@
 
 #include "runtime/player/words/words.h"
 
-#include <algorithm>
-#include <cctype>
-#include <cstdlib>
-
 #include "formats/base/clinical_names.h"
-#include "runtime/player/words/po_text.h"
 
 namespace sonocase::runtime::inline player_words {
 namespace {
@@ -16,53 +11,22 @@ const Language* g_in_use = nullptr;  // ImGui, which shows the words, is one per
 
 std::set<std::string> g_missing;
 
-const std::string* find_translation(std::string_view english) {
-    const std::vector<Translation>& catalogue = language_in_use().catalogue;
-    const auto found = std::lower_bound(
-        catalogue.begin(), catalogue.end(), english,
-        [](const Translation& t, std::string_view key) { return t.english < key; });
-    return found != catalogue.end() && found->english == english ? &found->other : nullptr;
-}
-
 }  // namespace
 
 const std::set<std::string>& missing_words() {
     return g_missing;
 }
 
-std::span<const Language> languages() {
-    static const std::vector<Language> kLanguages = [] {
-        std::vector<Language> all{{"en", "English", {}}};
-        for (const std::string_view text : catalogue_texts()) all.push_back(read_po(text));
-        return all;
-    }();
-    return kLanguages;
-}
-
 void use_language(const std::string& code) {
-    g_in_use = &languages().front();
-    for (const Language& language : languages()) {
-        const std::size_t end = language.code.size();
-        if (code.rfind(language.code, 0) == 0 &&
-            (code.size() == end || !std::isalpha(static_cast<unsigned char>(code[end]))))
-            g_in_use = &language;
-    }
+    g_in_use = &find_language(code);
 }
 
 const Language& language_in_use() {
     return g_in_use ? *g_in_use : languages().front();
 }
 
-std::string locale_language() {
-    for (const char* name : {"LC_ALL", "LC_MESSAGES", "LANG"}) {
-        const char* value = std::getenv(name);
-        if (value && *value) return value;
-    }
-    return "en";
-}
-
 const char* translation(const char* english) {
-    const std::string* other = find_translation(english);
+    const std::string* other = language_in_use().find(english);
     return other ? other->c_str() : nullptr;
 }
 
@@ -73,12 +37,7 @@ const char* tr(const char* english) {
 }
 
 std::string tr_message(const Message& message) {
-    if (language_in_use().catalogue.empty()) return static_cast<const std::string&>(message);
-    const std::string* other = find_translation(message.format());
-    if (message.arguments().empty()) return other ? *other : message;
-    std::vector<std::string> arguments;
-    for (const Message& argument : message.arguments()) arguments.push_back(tr_message(argument));
-    return filled_in(other ? *other : message.format(), arguments);
+    return language_in_use().words(message);
 }
 
 std::string tissue_words(const std::string& label) {

@@ -1,40 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// What the window says, in the user's language, by gettext's method: the English words stand in the
-// code and are the key of the catalogues, runtime/player/locale/<language>.po, which are compiled
-// into the program. A test finds every tr("...") and Message("...") and sees that each language has
-// it, with the same fields.
+// What the window says, in the user's language (formats/words/catalogue.h). A test finds every
+// tr("...") and Message("...") and sees that each language has it, with the same fields.
 #pragma once
 
 #include <algorithm>
 #include <cstdio>
 #include <set>
-#include <span>
 #include <string>
-#include <vector>
 
 #include "formats/base/message.h"
+#include "formats/words/catalogue.h"
 
 namespace sonocase::runtime::inline player_words {
 
-struct Translation {
-    std::string english, other;
-};
-
-struct Language {
-    std::string code;                    // ISO 639-1
-    std::string name;                    // in that language
-    std::vector<Translation> catalogue;  // empty: English itself; sorted by `english`
-};
-
-std::span<const Language> languages();  // English first
-
-// code: of a language above, or a locale such as "de_AT.UTF-8"; anything else is English. One per
-// process, like the window; to be called by the window's thread.
+// code: as find_language() takes it. One per process, like the window; to be called by the window's
+// thread.
 void use_language(const std::string& code);
 const Language& language_in_use();
-// The code of the user's locale: LC_ALL, LC_MESSAGES or LANG.
-std::string locale_language();
 
 // Words that were asked for and that the catalogue of the language in use lacks; for tests.
 const std::set<std::string>& missing_words();
@@ -55,8 +38,7 @@ std::string filled(const char* format, const Values&... values) {
 }
 
 // What is put together before it reaches the window (notices, errors, messages of trackers), in the
-// language in use: the format and each argument are translated by themselves, and what the
-// catalogue lacks stays as it is. Standard error keeps the English.
+// language in use. Standard error keeps the English.
 std::string tr_message(const Message& message);
 
 // The name of a label as clinicians write it: "kidney_left" is "Left kidney", "Niere links"

@@ -35,12 +35,14 @@ function hands_words(state, region_words) {
         ...state.complications.map((words) => t(words))].filter((words) => words).join(' · ');
 }
 
+const level_gain = () => ({gain_db: 0, tgc_db: new Array(kSliders).fill(0)});
+
 export class ScanPage {
     // page: app.js, for what leads away from scanning
     constructor(page) {
         this.page = page;
         this.picture = new Picture($('picture-box'), $('picture'), $('overlay'));
-        this.console = {gain_db: 0, range_db: 60, tgc_db: new Array(kSliders).fill(0), flip: false};
+        this.console = {...level_gain(), range_db: 60, flip: false};
         this.values = {};
         this.measures = [];
         this.frozen = false;
@@ -110,7 +112,11 @@ export class ScanPage {
             this.signature = null;
             $('signed').textContent = '';
         }
+        // Another exercise opens as it is meant to look; the same again keeps what the hand has set.
+        const other = this.description !== description || this.shown_exercise !== exercise;
+        if (other) Object.assign(this.console, level_gain());
         this.description = description;
+        this.shown_exercise = exercise;
         this.frozen = this.replays = false;
         this.measures = [];
         this.first_point = null;
@@ -148,7 +154,7 @@ export class ScanPage {
         $('presets').replaceChildren(...this.description.presets.map((preset) => {
             const button = element('button', t(preset.name), {type: 'button', title: t(preset.tip)});
             button.addEventListener('click', () => {
-                this.set_console({gain_db: 0, tgc_db: new Array(kSliders).fill(0)});
+                this.set_console(level_gain());
                 this.set_image(preset);
             });
             return button;
@@ -426,7 +432,7 @@ export class ScanPage {
         this.console.tgc_db[slider] = clamp(db, -20, 20);
         this.set_console({});
     }
-    level() { this.set_console({tgc_db: new Array(kSliders).fill(0)}); }
+    level() { this.set_console({tgc_db: level_gain().tgc_db}); }
     auto_gain() { if (this.status === 0) this.set_console(this.core.adjusted_gain()); }
     flip() { this.set_console({flip: !this.console.flip}); }
     flip_sign() { return this.console.flip ? -1 : 1; }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // What the page says, by gettext's method: the English words stand in the code and are the key of the catalogues,
-// those of the window (runtime/player/locale) and the page's own (locale). scripts/web-words.mjs makes one file a language
+// those of the window (formats/words/locale) and the page's own (locale). scripts/web-words.mjs makes one file a language
 // of them, words-CODE.json.
 const kLanguages = [['en', 'English'] /*LANGUAGES*/];
 let language = 'en', catalogue = {};

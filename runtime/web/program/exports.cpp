@@ -317,8 +317,9 @@ SONOCASE_EXPORT(set_tgc) void set_tgc(int slider, double db) {
 // Gain and depth gain from the last picture (runtime/engine/auto_gain.h): gain, then the sliders.
 SONOCASE_EXPORT(adjust_gain) const double* adjust_gain() {
     const PagePlayer& p = *page.player;
-    runtime::adjust_gain(p.pixels(), p.image().width_px, p.engine().renderer().layout(),
-                         p.image().depth_mm, page.settings);
+    const runtime::Renderer& renderer = p.engine().renderer();
+    runtime::adjust_gain(p.pixels(), p.image().width_px, renderer.layout(), p.image().depth_mm,
+                         renderer.gain_law(), page.settings);
     page.numbers.assign(page.settings.tgc_db.begin(), page.settings.tgc_db.end());
     page.numbers.insert(page.numbers.begin(), page.settings.gain_db);
     return page.numbers.data();

@@ -34,6 +34,8 @@ TEST(SuggestName, NamesTheNearestOrAllValidOnes) {
     const std::vector<std::string> names{"labels", "surface"};
     EXPECT_EQ(suggest_name("label", names), "did you mean 'labels'?");
     EXPECT_EQ(suggest_name("mannequin", names), "valid here: labels, surface");
+    const std::vector<std::string> titles{"Analytic torso, procedures", "Neck"};
+    EXPECT_EQ(suggest_name("femoral", titles), "valid here: 'Analytic torso, procedures', Neck");
 }
 
 TEST(SuggestName, TheMistypedOptionIsNamed) {

@@ -82,7 +82,9 @@ TEST(Chart, RowsHaveTheirNamesAndValuesAndNoAxis) {
         const std::size_t from = svg.rfind(" y=\"", name);
         ASSERT_NE(from, std::string::npos);
         heights.push_back(std::stod(svg.substr(from + 4)));
-        if (n > 1) EXPECT_GT(heights[n - 1] - heights[n - 2], 30);
+        if (n > 1) {
+            EXPECT_GT(heights[n - 1] - heights[n - 2], 30);
+        }
     }
     EXPECT_LT(heights.back(), 400);
     for (const char* words : {">11.1<", ">88.8<", ">with help<"})

@@ -201,6 +201,55 @@ TEST(KnownMap, GrossOutliersAreLeftOutAndCounted) {
     EXPECT_GT(measure(f.result, "readings_lifted_off"), 50);
 }
 
+// A third of the readings is of a hand beside the belly: too many to be the tail of a residual.
+TEST(KnownMap, ReadingsOfAHandAreNamed) {
+    NEEDS_PATIENT();
+    Random random(6);
+    const Registration truth =
+        testing::random_quadratic_map(patient()->skin.box, patient()->skin.skin, random, 9);
+    Surface sweep = testing::sweep_of(patient()->skin.skin, truth, random, {});
+    const std::size_t own = sweep.points.size();
+    const Box3& box = patient()->skin.box;
+    const Point3 hand{box.centre().x + 40, box.upper.y + 70, box.centre().z};
+    for (std::size_t n = 0; n < own / 2; ++n) {
+        const Vector3 d = normalized(
+            Vector3{random.gaussian(), random.gaussian(), random.gaussian()} + Vector3{1e-9, 0, 0});
+        sweep.points.push_back(
+            mannequin_from_ct(truth, hand + Vector3{45 * d.x, 35 * d.y, 90 * d.z}));
+    }
+    const auto fitted = register_surfaces({patient()->skin, sweep}, {});
+    ASSERT_TRUE(fitted) << fitted.error().message();
+    HardCase inside("interior error, a third of the readings of a hand, mean", HardCase::at_most,
+                    1.5, "mm");
+    inside.see(target_error(fitted->registration, truth).mean);
+    EXPECT_GT(measure(*fitted, "readings_off_skin"), 0.4 * static_cast<double>(own));
+    EXPECT_NE(warnings_of(*fitted).find("a hand"), std::string::npos) << warnings_of(*fitted);
+    EXPECT_EQ(warnings_of(*fitted).find("same part"), std::string::npos);
+}
+
+// Readings of a body of another size, and those of the patient's own: alone the former are said.
+TEST(KnownMap, ABodyOfAnotherSizeIsNamedByItsSize) {
+    NEEDS_PATIENT();
+    HardCase told("of 3 bodies of .55, 1 and 1.5 times the size, said wrongly", HardCase::at_most,
+                  0, "");
+    int wrong = 0;
+    for (const double scale : {0.55, 1.0, 1.5}) {
+        Random random(7);
+        Registration same;
+        same.quadratic = QuadraticMap::from_rigid(Rigid{}, {}, 200);
+        Surface sweep = testing::sweep_of(patient()->skin.skin, same, random, {});
+        for (Point3& p : sweep.points) p = Point3{} + scale * (p - Point3{});
+        RegisterOptions options;
+        options.up = Vector3{0, 0, 1};
+        const auto aligned = align_surfaces({patient()->skin, sweep}, options);
+        ASSERT_TRUE(aligned) << aligned.error().message();
+        const bool said = warnings_of(*aligned).find("times as wide") != std::string::npos;
+        EXPECT_EQ(said, scale != 1.0) << scale << ": " << warnings_of(*aligned);
+        wrong += said != (scale != 1.0);
+    }
+    told.see(wrong);
+}
+
 TEST(KnownMap, ARigidCopyIsNotBent) {
     NEEDS_PATIENT();
     const Fitted f = fit(6, 0, {});

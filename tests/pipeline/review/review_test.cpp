@@ -3,13 +3,18 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-
 #include <filesystem>
+#include <regex>
+#include <set>
 
 #include "formats/exercise/metric_table.h"
 #include "formats/files/atomic_file.h"
 #include "formats/files/load_save.h"
+#include "formats/scoring/procedure_run.h"
+#include "formats/scoring/session_monitor.h"
+#include "formats/words/catalogue.h"
 #include "pipeline/review/review.h"
+#include "support/paths.h"
 #include "support/run_command.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"
@@ -184,6 +189,55 @@ TEST(Review, OddSessionsStillGiveAPage) {
     EXPECT_TRUE(std::any_of(input->warnings.begin(), input->warnings.end(), [](const auto& w) {
         return w.find("cannot be judged") != std::string::npos;
     }));
+}
+
+// The words of the page stand in its template, in its source and in tables of formats.
+TEST(Review, EveryLanguageHasEveryWord) {
+    std::set<std::string> words;
+    const auto collect = [&](const std::string& file, const char* pattern) {
+        const std::string text = testing::read_text(SONOCASE_SOURCE "/pipeline/review/" + file);
+        const std::regex form(pattern);
+        std::size_t found = 0;
+        for (std::sregex_iterator it(text.begin(), text.end(), form), end; it != end; ++it, ++found)
+            words.insert((*it)[1]);
+        EXPECT_GT(found, 1u) << file << " " << pattern;
+    };
+    collect("review_page.html", R"(\{\{_([^}]+)\}\})");
+    collect("review.cpp", R"re(words\(\{?\s*"([^"]+)")re");
+    collect("review.cpp", R"re(words\([\w.]+ \? "([^"]+)")re");
+    collect("review.cpp", R"re(\{"[a-z]+", "([A-Z][a-z]+)"\})re");
+    collect("review_input.cpp", R"re(push_back\(\s*\{"([^"]+\.)")re");
+    collect("session_views.cpp", R"re(\{"([A-Z][^"]+)",)re");
+    for (int kind = 0; kind <= static_cast<int>(LiveEventKind::complication); ++kind) {
+        std::string name =
+            session_event({.kind = static_cast<LiveEventKind>(kind), .index = 0}, {}, {}).name;
+        std::replace(name.begin(), name.end(), '_', ' ');
+        words.insert(name);
+    }
+    for (const char* why :
+         {"too_early", "too_late", "happened", "wrong_answer", "not_answered", "not_done"})
+        words.insert(missed_words(why));
+    words.insert({"not passed", "picture"});
+    for (const MetricInfo& metric : metric_table()) words.insert(metric.title);
+    for (const char* title : complication_titles()) words.insert(title);
+    for (const Language& language : languages().subspan(1)) {
+        for (const std::string& english : words)
+            EXPECT_NE(language.find(english), nullptr) << language.code << ": " << english;
+    }
+}
+
+TEST(Review, IsWrittenInTheLanguageOfItsReader) {
+    Files files;
+    ReviewOptions options;
+    options.language = "de_AT.UTF-8";
+    const auto input = load_review(files.session, files.bundle, options);
+    ASSERT_TRUE(input) << input.error().message();
+    const std::string page = review_page(*input, {});
+    EXPECT_NE(page.find("<html lang=de>"), std::string::npos);
+    for (const char* words : {"Zeitverlauf", "Alle Werte", "Einstich", "Spitze zum Ziel"})
+        EXPECT_NE(page.find(words), std::string::npos) << words;
+    for (const char* words : {"Time line", "All scores", "needle entry", "tip to target", "{{"})
+        EXPECT_EQ(page.find(words), std::string::npos) << words;
 }
 
 TEST(Review, AnotherCaseAndAMissingExerciseAreSaid) {

@@ -7,9 +7,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/files/atomic_file.h"
 #include "pipeline/export/accuracy_picture.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/tradeoff/suites.h"
+#include "pipeline/tradeoff/tradeoff_page.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -158,11 +160,50 @@ TEST(CaseAccuracy, DrawsEveryPartOfTheBudgetAndSaysWhatIsNotKnown) {
     for (const char* part : {"mine", "skin beside the mannequin", " 14.00 mm  organs", "together",
                              "tracker", "20.0 mm  (6.0 with two landmarks)", "as it is"})
         EXPECT_NE(said.find(part), std::string::npos) << part << "\n" << said;
+    EXPECT_NE(said.find("lies 14 mm from its place in the patient; nearly all of that is organs"),
+              std::string::npos)
+        << said;
+    EXPECT_NE(said.find("Two landmarks far apart would bring that to 5"), std::string::npos)
+        << said;
+    EXPECT_NE(said.find("Finer voxels buy nothing."), std::string::npos) << said;
     // The longest bar is the largest part's, and no line is wider than its words need.
     EXPECT_NE(said.find("################################  14.00 mm"), std::string::npos) << said;
     const std::string svg = accuracy_svg(accuracy);
     EXPECT_EQ(svg.find("<svg"), svg.find("<"));
     EXPECT_FALSE(write_accuracy_picture(accuracy, "accuracy.gif").has_value());
+}
+
+// What an author asks first: the structures that the exercises need.
+TEST(CaseAccuracy, PutsStructuresWithTargetsBeforeThoseThatAreKnownLeast) {
+    CaseBundle bundle;
+    bundle.manifest.stages = reports(2, 14, 5);
+    bundle.manifest.stages[0].groups = {
+        {"unknown_p90_mm", {{"rib", 30}, {"liver", 20}, {"spleen", 25}, {"aorta", 8}}},
+        {"unknown_p90_with_two_landmarks_mm", {{"rib", 3}, {"liver", 6}}}};
+    std::string exercise =
+        *read_text_file(SONOCASE_SOURCE "/scenarios/demo-torso/liver-biopsy.toml");
+    exercise.erase(exercise.find("frame = \"ct\"\n"), 13);  // as a cooked case has it
+    bundle.exercises.push_back({.name = "biopsy", .toml = exercise});
+    const auto places = unknown_places_of_case(bundle);
+    ASSERT_EQ(places.size(), 4u);
+    EXPECT_EQ(places[0].label, "liver");
+    EXPECT_TRUE(places[0].target);
+    EXPECT_EQ(places[1].label, "rib");
+    EXPECT_FALSE(places[1].target);
+    EXPECT_EQ(landmark_advice(places),
+              "two landmarks far apart would bring liver from 20.0 to 6.0 mm");
+    // A fit that is good inside asks for finer voxels alone.
+    bundle.manifest.stages = reports(2, 0.1, 0);
+    const std::string fine =
+        accuracy_summary(case_accuracy(bundle, case_points(table(), bundle.manifest.stages, 8e6)));
+    EXPECT_NE(fine.find(" With resample.voxel_mm=1 it would be "), std::string::npos) << fine;
+}
+
+// The line of each part, and the table of options, are those of the page as it stands.
+TEST(AccuracyPage, IsWhatItsOwnPartsSay) {
+    const std::string page = *read_text_file(SONOCASE_SOURCE "/docs/accuracy.md");
+    EXPECT_EQ(format_accuracy_markdown({}, page), page);
+    EXPECT_NE(page.find("| 5.66 in "), std::string::npos);
 }
 
 TEST(NextStep, IsTwoLandmarksWhereTheyHelpMost) {

@@ -21,8 +21,12 @@ std::vector<std::uint8_t> picture(const std::vector<int>& levels) {
     return pixels;
 }
 
-ImageSettings adjusted(const std::vector<int>& levels, ImageSettings settings = {}) {
-    adjust_gain(picture(levels), kSide, kLayout, kSide * kLayout.mm_per_px, settings);
+constexpr GainLaw kLogarithm{0, 0, 60};
+
+ImageSettings adjusted(const std::vector<int>& levels,
+                       ImageSettings settings = {},
+                       const GainLaw& law = kLogarithm) {
+    adjust_gain(picture(levels), kSide, kLayout, kSide * kLayout.mm_per_px, law, settings);
     return settings;
 }
 
@@ -40,6 +44,18 @@ TEST(AutoGain, ADarkPictureGetsTheDecibelsThatItLacks) {
     for (const double db : after.tgc_db) EXPECT_EQ(db, 0);
 }
 
+// 6 dB are a factor of two in amplitude, and two thirds of its logarithm in a grey of exponent 2/3;
+// a console's range of 90 dB makes that 4/9. The logarithm would say 7 dB, and 11 at 90.
+TEST(AutoGain, AMachineOfPowersGetsWhatItsOwnMapAsksFor) {
+    const std::vector<int> dark(8, 65);
+    EXPECT_EQ(adjusted(dark, {}, {35, 1, 0}).gain_db, 6);
+    EXPECT_EQ(adjusted(dark, {}, {35, 2.0 / 3, 60}).gain_db, 9);
+    ImageSettings settings;
+    settings.dynamic_range_db = 90;
+    EXPECT_EQ(adjusted(dark, settings, {35, 2.0 / 3, 60}).gain_db, 14);
+    EXPECT_EQ(adjusted(dark, settings, {35, 2.0 / 3, 0}).gain_db, 9);
+}
+
 TEST(AutoGain, DepthsAreBroughtTowardsEachOther) {
     const ImageSettings after = adjusted({155, 155, 95, 95, 95, 95, 35, 35});
     EXPECT_LT(after.tgc_db[0], 0);
@@ -54,8 +70,8 @@ TEST(AutoGain, WhatShowsNoEchoSaysNothingAndLimitsHold) {
     EXPECT_EQ(adjusted({31, 31, 31, 31, 31, 31, 31, 31}, settings).gain_db, 30);
     settings.tgc_db.fill(-20);
     EXPECT_EQ(adjusted({255, 31, 31, 31, 31, 31, 31, 31}, settings).tgc_db[0], -20);
-    adjust_gain({}, 0, kLayout, 100, settings);
-    adjust_gain({}, 10, kLayout, 0, settings);
+    adjust_gain({}, 0, kLayout, 100, kLogarithm, settings);
+    adjust_gain({}, 10, kLayout, 0, kLogarithm, settings);
 }
 
 }  // namespace

@@ -378,9 +378,7 @@ TEST(PagePlayer, the_first_picture_is_the_windows) {
     std::string warning;
     const Settings first = load_settings(folder.path() + "/none.json", warning);
     ImageSettings console;
-    console.gain_db = first.gain_db;
     console.dynamic_range_db = first.dynamic_range_db;
-    for (std::size_t i = 0; i < console.tgc_db.size(); ++i) console.tgc_db[i] = first.tgc_db[i];
     for (int n = 0; n < 2; ++n) {
         const Exercise& exercise = (*open)->exercises[static_cast<std::size_t>(n)];
         const PlayerArguments none;

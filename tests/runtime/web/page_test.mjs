@@ -463,6 +463,14 @@ await run_tests({
         await page.until('document.getElementById("value-punctures").hidden');
         await page.key('KeyN');
         await page.until('!document.getElementById("value-punctures").hidden');
+        // The same exercise again keeps the gain that was set; another one opens at 0 with even depth gain.
+        const gain = 'sonoplay.app.scan.console.gain_db', exercise = await page.value('sonoplay.app.exercise');
+        await page.value('sonoplay.app.scan.set_console({gain_db: 9}); sonoplay.app.scan.set_tgc(2, -5)');
+        await page.value(`sonoplay.app.choose_exercise(${exercise})`);
+        await page.until(`${kFrames} > ${await page.value(kFrames)} + 2`);
+        expect_equal(await page.value(gain), 9, 'the same again');
+        await page.value(`sonoplay.app.choose_exercise(${exercise + 1})`);
+        await page.until(`sonoplay.app.exercise !== ${exercise} && ${gain} === 0 && sonoplay.app.scan.console.tgc_db[2] === 0`);
         expect_equal(page.errors.join(), '', 'errors on the console');
         await page.close();
         its_server.closeAllConnections?.();

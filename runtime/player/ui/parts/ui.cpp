@@ -374,7 +374,7 @@ void Ui::draw_button(const Box& box,
     if (!plain) fill(box, back, kRadius);
     if (style.link && style.enabled) ink = colour::kAccent;
     if (style.chosen) fill({box.x + 3, box.bottom() - 3, box.w - 6, 3}, colour::kAccent, 1.5f);
-    const Type type = style.primary || style.chosen ? Type::bold : Type::body;
+    Type type = style.primary || style.chosen ? Type::bold : Type::body;
     if (style.tile) {
         icon(style.icon, box.x + 0.5f * box.w - 12, box.y + 6, 24, ink);
         text({box.x + 2, box.bottom() - 24, box.w - 4, 20}, words, Type::small, ink, Align::centre);
@@ -384,7 +384,8 @@ void Ui::draw_button(const Box& box,
     const std::string key_name = std::strlen(style.key) > 2 ? tr(style.key) : style.key;
     const float key_width = key_name.empty() ? 0 : width(key_name, Type::small) + 12;
     const float icon_width = style.icon != Icon::none ? (words.empty() ? 24.0f : 32.0f) : 0;
-    // Words that are long in some language take the padding too.
+    // Words that are long in some language take the padding too, or small letters.
+    if (style.may_cut && icon_width + width(words, type) > box.w - 6) type = Type::small;
     const bool tight = icon_width + width(words, type) > box.w - 20;
     const float pad = style.link || tight ? 3.0f : 10.0f;
     const float all = icon_width + width(words, type) + (key_width > 0 ? key_width + 10 : 0);

@@ -31,8 +31,8 @@ struct ButtonStyle {
     bool link = false;   // words in the accent colour, no fill
     bool tile = false;   // icon above small words
     bool left = false;   // words at the left edge
-    // The words are the user's own (a name, a title) and may be too long: an ellipsis then stands
-    // for the rest, and the tooltip shows the whole.
+    // The words are the user's own (a name, a title) or an author's, and may be too long: they are
+    // small then, or an ellipsis stands for the rest, and the tooltip shows the whole.
     bool may_cut = false;
     const char* key = "";  // shown as a key cap; empty: none
     const char* tip = "";  // tooltip; empty: none

@@ -82,7 +82,9 @@ TEST(GlbFile, EveryTruncationIsRefusedInOneLine) {
     for (std::size_t n = 0; n < whole.size(); n += 7) {
         const auto nodes = read_glb(std::span(whole).first(n), "x.glb");
         read += nodes.has_value();
-        if (!nodes) EXPECT_EQ(nodes.error().message().find('\n'), std::string::npos);
+        if (!nodes) {
+            EXPECT_EQ(nodes.error().message().find('\n'), std::string::npos);
+        }
     }
     testing::HardCase cut("of files cut off anywhere, read", testing::HardCase::at_most, 0, "");
     cut.see(read);

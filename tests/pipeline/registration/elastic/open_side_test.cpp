@@ -56,18 +56,24 @@ TEST(OpenSide, OfHalfAndWholeCylinders) {
     }
 }
 
+// What lies farther along a direction than a share of the mannequin's half extent.
+Surface part_of(const BuiltMannequin& whole, Vector3 to, double from) {
+    Point3 centre;
+    double half_mm = 0;
+    for (Point3 p : whole.sweep.points)
+        centre = centre + (p - Point3{}) / static_cast<double>(whole.sweep.points.size());
+    for (Point3 p : whole.sweep.points) half_mm = std::max(half_mm, dot(p - centre, to));
+    Surface part;
+    for (Point3 p : whole.sweep.points)
+        if (dot(p - centre, to) > from * half_mm) part.points.push_back(p);
+    return part;
+}
+
 // A sweep of one flank is open as well, but not towards the back: no quarter turn follows.
 TEST(OpenSide, AFlankIsNoFront) {
     HardCase upright("cosine of its back and the mannequin's", HardCase::at_least, 0.7, "");
     const BuiltMannequin whole = built_mannequin(Build::belly, 2, {});
-    const Vector3 left = cross(whole.head, whole.back);
-    Point3 centre;
-    for (Point3 p : whole.sweep.points)
-        centre = centre + (p - Point3{}) / static_cast<double>(whole.sweep.points.size());
-    Surface flank;
-    for (Point3 p : whole.sweep.points) {
-        if (dot(p - centre, left) > 0) flank.points.push_back(p);
-    }
+    const Surface flank = part_of(whole, cross(whole.head, whole.back), 0);
     const auto target = prepare_target(flank);
     ASSERT_TRUE(target);
     EXPECT_GT(find_open_side(*target, whole.head).size, 0.3);
@@ -83,6 +89,37 @@ TEST(OpenSide, AFlankIsNoFront) {
             EXPECT_EQ(note.text, "none");
         }
     }
+}
+
+// The side that a strip of a flank is open to is the other flank. It neither rolls the patient nor
+// makes a pose seem right that is not: heads as they are and turned.
+TEST(OpenSide, AStripOfAFlankIsNoFrontEither) {
+    HardCase upright("cosine of the back of a strip of a flank and the mannequin's",
+                     HardCase::at_least, 0.6, "");
+    HardCase right("of 6 strips of a flank, of whose pose something is called right that is wrong",
+                   HardCase::at_most, 0, "");
+    int called_right = 0;
+    const struct {
+        Build build;
+        double side;
+    } strips[] = {{Build::belly, -1}, {Build::slim, 1}, {Build::gaunt, 1}};
+    for (const auto& [build, side] : strips) {
+        const BuiltMannequin whole = built_mannequin(build, 3, {});
+        const Surface strip = part_of(whole, side * cross(whole.head, whole.back), 0.3);
+        for (const double sign : {1.0, -1.0}) {
+            RegisterOptions options;
+            options.up = sign * whole.head;
+            const auto aligned = align_surfaces({torso_patient().skin, strip}, options);
+            ASSERT_TRUE(aligned);
+            const Matrix3& turn = aligned->registration.mannequin_from_ct.rotation;
+            const double front = -dot(turn.column(1), whole.back),
+                         head = dot(turn.column(2), whole.head);
+            upright.see(std::abs(front));
+            called_right += (head < 0 && note(*aligned, "head").starts_with("right")) ||
+                            (front < 0 && note(*aligned, "front").starts_with("right"));
+        }
+    }
+    right.see(called_right);
 }
 
 TEST(OpenSide, TwentyOpenSweepsAreReadWithinFifteenDegreesAndClosedOnesNotAtAll) {

@@ -209,6 +209,61 @@ TEST(Truth, OnePixelAsksTheSameAsAllTogether) {
     }
 }
 
+// Places that follow from those of a tile's points are off by kMostOffMm at most where that is
+// tried, and by less than twice that in between: a pixel has the label of a place so near. One
+// place alone takes the gap of the nearest ray, half of 0.33 mm away at most, where gaps rise by
+// 0.1 mm per mm.
+TEST(Truth, PixelsOfATileHaveTheLabelsOfTheirOwnPlaces) {
+    const CaseBundle& bundle = phantom();
+    const CaseAnatomy anatomy(bundle);
+    const double near_mm = 2 * 0.02 + 0.5 * 0.33 * 0.1;
+    const std::uint64_t seed = 47;
+    SCOPED_TRACE(seed);
+    HardCase off("pixels with a label that no place within 0.06 mm of theirs has",
+                 HardCase::at_most, 0, "");
+    HardCase share("pixels whose own place has another label, share", HardCase::at_most, 0.001, "");
+    Random random(seed);
+    for (const ProbeShape shape :
+         {ProbeShape::linear, ProbeShape::curvilinear, ProbeShape::phased}) {
+        Exercise exercise = phantom_exercise();
+        exercise.probe.shape = shape;
+        exercise.breathing.amplitude_mm = 12;
+        exercise.breathing.direction = {0, 0.6, 0.8};
+        const RenderOptions options = picture(512, 400, {"-deformation"});
+        auto truth = truth_of(bundle, exercise, options);
+        for (int n = 0; n < 4; ++n) {
+            FrameInput input;  // lifted and turned: gaps to close, and beams in air
+            input.mannequin_from_probe.translation = {random.uniform(-10, 10), 2,
+                                                      random.uniform(-9, 2)};
+            input.mannequin_from_probe.rotation =
+                rotation_about({0, 1, 0}, random.uniform(-0.1, 0.1)) *
+                rotation_about({0, 0, 1}, random.uniform(0, 3));
+            input.time_s = random.uniform(0, 8);
+            Planes planes(options);
+            truth.render(input, planes.spans());
+            int scanned = 0, differ = 0, far = 0;
+            for (int row = 0; row < options.height_px;
+                 row += 5)  // of every column and row of tiles
+                for (int column = 0; column < options.width_px; column += 5) {
+                    const PixelTruth pixel = truth.at(input, column, row);
+                    if (!pixel.scanned) continue;
+                    ++scanned;
+                    const int label = planes.labels[planes.at(column, row)];
+                    if (label == pixel.label) continue;
+                    ++differ;
+                    bool found = false;
+                    for (int step = 0; step < 27 && !found; ++step) {
+                        const Vector3 by{step % 3 - 1.0, step / 3 % 3 - 1.0, step / 9 - 1.0};
+                        found = anatomy.label(pixel.rest + near_mm * by) == label;
+                    }
+                    far += !found;
+                }
+            off.see(far);
+            share.see(static_cast<double>(differ) / scanned);
+        }
+    }
+}
+
 TEST(Truth, EveryInstructionSetAndAStreamedBundleGiveTheSameBytes) {
     const sonocase::testing::TemporaryFolder folder;
     const std::string path = folder / "phantom.sonocase";

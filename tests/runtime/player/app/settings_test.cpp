@@ -14,8 +14,7 @@ using sonocase::testing::TemporaryFolder;
 TEST(Settings, ComeBackAsSaved) {
     const TemporaryFolder folder;
     Settings s;
-    s.gain_db = 4.5;
-    s.tgc_db = {1, 2, 3, 4, 5, 6, 7, 8};
+    s.dynamic_range_db = 54.5;
     s.recent = {"/a b/c.sonocase", "/\"quoted\".sonocase"};
     s.tracker = "viper";
     s.needle_sensor = 4;
@@ -23,8 +22,7 @@ TEST(Settings, ComeBackAsSaved) {
     std::string warning;
     const Settings read = load_settings(folder / "deep/er/player.json", warning);
     EXPECT_EQ(warning, "");
-    EXPECT_EQ(read.gain_db, 4.5);
-    EXPECT_EQ(read.tgc_db, s.tgc_db);
+    EXPECT_EQ(read.dynamic_range_db, 54.5);
     EXPECT_EQ(read.recent, s.recent);
     EXPECT_EQ(read.tracker, "viper");
     EXPECT_EQ(read.needle_sensor, 4);
@@ -46,15 +44,13 @@ TEST(Settings, HoldNothingOutOfRange) {
     const TemporaryFolder folder;
     folder.write(
         "odd.json",
-        R"({"window_width_px": -5, "ui_scale": 1e9, "gain_db": "loud", "tgc_db": [99], "recent": 7,
+        R"({"window_width_px": -5, "ui_scale": 1e9, "dynamic_range_db": "loud", "recent": 7,
                    "probe_sensor": 1000, "unknown": true})");
     std::string warning;
     const Settings s = load_settings(folder / "odd.json", warning);
     EXPECT_EQ(s.window_width_px, 960);
     EXPECT_EQ(s.ui_scale, 4);
-    EXPECT_EQ(s.gain_db, 0);
-    ASSERT_EQ(s.tgc_db.size(), 8u);
-    EXPECT_EQ(s.tgc_db[0], 20);
+    EXPECT_EQ(s.dynamic_range_db, 60);
     EXPECT_TRUE(s.recent.empty());
     EXPECT_EQ(s.probe_sensor, 15);
 }

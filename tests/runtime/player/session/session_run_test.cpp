@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <memory>
 
 #include "runtime/player/session/clock.h"
@@ -105,6 +106,51 @@ TEST(SessionRun, AReplayGivesTheSamePixelsToTheLastBit) {
         engine.frame(now_s, settings, pixels);
         ASSERT_EQ(pixels, shown[i]) << "frame " << i;
     }
+}
+
+// Of two insertions, one that ends and one that does not, the review can show where the needle was
+// at its deepest.
+TEST(SessionRun, KeepsThePictureOfEachInsertionsDeepestPoint) {
+    const testing::TemporaryFolder folder;
+    const std::string path = folder / "s.igs.mha";
+    const auto open = small_open_case();
+    ScanEngine engine = engine_of(*open);
+    std::vector<std::uint8_t> pixels(128 * 128);
+    std::map<double, std::vector<std::uint8_t>> shown;
+    auto run = SessionRun::start(path, *open, engine, "", utc_now(), 0);
+    ASSERT_TRUE(run) << run.error().message();
+    testing::Random hands(2);
+    // The tip goes to reading 80, out again to 0, and in to 60.
+    const auto place = [](int i) { return i < 80 ? i : i < 160 ? 160 - i : i - 160; };
+    for (int i = 0; i <= 220; ++i) {
+        TrackerReading reading = reading_at(place(i), hands);
+        reading.sequence = static_cast<std::uint64_t>(i) + 1;
+        reading.time_s = i / 40.0;
+        for (auto sensor : {kProbeSensor, kNeedleSensor})
+            reading.sensors[sensor].state = SensorState::ok;
+        engine.observe(reading, false);
+        engine.frame(i / 40.0, {}, pixels);
+        (*run)->observe(engine.last(), pixels, true);
+        shown[engine.last().input.time_s] = pixels;
+    }
+    ASSERT_TRUE((*run)->finish());
+    const auto kept = load_sequence(pictures_path(path));
+    ASSERT_TRUE(kept) << kept.error().message();
+    std::vector<double> deepest_s;
+    for (std::size_t i = 0; i < kept->frames.size(); ++i) {
+        const SequenceFrame& frame = kept->frames[i];
+        if (i > 0) {
+            EXPECT_LE(kept->frames[i - 1].timestamp_s, frame.timestamp_s);
+        }
+        if (frame.fields.front().value != "deepest") continue;
+        deepest_s.push_back(frame.timestamp_s);
+        const auto begin = kept->pixels.begin() + static_cast<std::ptrdiff_t>(i * 128 * 128);
+        ASSERT_TRUE(shown.count(frame.timestamp_s));
+        EXPECT_TRUE(std::equal(begin, begin + 128 * 128, shown[frame.timestamp_s].begin()));
+    }
+    ASSERT_EQ(deepest_s.size(), 2u);
+    EXPECT_NEAR(deepest_s[0], 80 / 40.0, 2.5 / 40);  // 0.6 mm a reading, and kept each 0.5 mm
+    EXPECT_NEAR(deepest_s[1], 220 / 40.0, 2.5 / 40);
 }
 
 // A cyst to be drained: numbed outside it, emptied, and the needle rests in it.

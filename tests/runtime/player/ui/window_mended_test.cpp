@@ -52,21 +52,34 @@ class WindowMended : public sonocase::testing::WindowRun {
 };
 
 TEST_F(WindowMended, ControlAndEqualChangeTheWordsAndNotTheGain) {
-    ASSERT_EQ(run("", "wait 4\nhold = 20 ctrl\nwait 2\nquit\n").status, 0);
-    EXPECT_EQ(settings()["gain_db"], 0);
+    ASSERT_EQ(run("", "wait 4\nhold = 20 ctrl\nwait 2\n" + shot("words") + "quit\n").status, 0);
+    EXPECT_TRUE(says("words", " 0 dB\n"));
     EXPECT_GT(settings()["ui_scale"].get<double>(), 1.05);
-    ASSERT_EQ(run("--ui-scale 1", "wait 4\nhold = 20\nwait 2\nquit\n").status, 0);
-    EXPECT_GT(settings()["gain_db"].get<double>(), 1);
+    ASSERT_EQ(run("--ui-scale 1", "wait 4\nhold = 20\nwait 2\n" + shot("gain") + "quit\n").status,
+              0);
+    EXPECT_FALSE(says("gain", " 0 dB\n"));
+}
+
+// Neither another exercise nor another day begins with what was set for this one.
+TEST_F(WindowMended, AnExerciseOpensAtGainZero) {
+    ASSERT_EQ(run("", "wait 4\nhold = 20\nwait 2\n" + shot("set") + "key f5\nwait 4\n" +
+                          shot("next") + "quit\n")
+                  .status,
+              0);
+    EXPECT_FALSE(says("set", " 0 dB\n"));
+    EXPECT_TRUE(says("next", " 0 dB\n"));
+    ASSERT_EQ(run("", "wait 4\n" + shot("later") + "quit\n").status, 0);
+    EXPECT_TRUE(says("later", " 0 dB\n"));
 }
 
 // A session that ends, or a system that shuts down.
 TEST_F(WindowMended, SigtermKeepsTheSettings) {
     const std::string picture = folder_ / "now.png";
-    const std::string line = command("", "wait 4\nhold = 30\nwait 2\n" + shot("now"));
+    const std::string line = command("", "wait 4\nhold = 30 ctrl\nwait 2\n" + shot("now"));
     const CommandResult result = in_display(line + " &\nplayer=$!\nuntil [ -e " + picture +
                                             " ]; do :; done\nkill -TERM $player\nwait $player");
     EXPECT_EQ(result.status, 0) << result.error;
-    EXPECT_GT(settings()["gain_db"].get<double>(), 1);
+    EXPECT_GT(settings()["ui_scale"].get<double>(), 1.05);
 }
 
 // What was measured in one picture says nothing about the next.

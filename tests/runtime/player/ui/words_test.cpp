@@ -13,11 +13,11 @@
 #include "formats/exercise/metric_table.h"
 #include "formats/exercise/needle_makes.h"
 #include "formats/scoring/attempt_result.h"
+#include "formats/words/catalogue.h"
 #include "runtime/imaging/paper/paper_model.h"
 #include "runtime/imaging/physical/model/physical_effects.h"
 #include "runtime/player/app/case_steps.h"
 #include "runtime/player/ui/keys.h"
-#include "runtime/player/words/po_text.h"
 #include "runtime/tracking/guided_start.h"
 #include "support/paths.h"
 #include "support/run_command.h"
@@ -68,7 +68,7 @@ TEST_F(Words, KeepPrintfFieldsInTheirOrderAndAreListedOnce) {
 TEST_F(Words, CataloguesHoldNoEmptyFuzzyOrObsoleteEntry) {
     std::size_t catalogues = 0;
     for (const auto& entry :
-         std::filesystem::directory_iterator(SONOCASE_SOURCE "/runtime/player/locale")) {
+         std::filesystem::directory_iterator(SONOCASE_SOURCE "/formats/words/locale")) {
         const std::string text = sonocase::testing::read_text(entry.path().string());
         const Language language = read_po(text);
         EXPECT_EQ(language.code, entry.path().stem()) << entry.path();

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "runtime/player/words/po_text.h"
+#include "formats/words/catalogue.h"
 
 #include <algorithm>
-#include <string>
+#include <cctype>
+#include <cstdlib>
 #include <utility>
 
-namespace sonocase::runtime::inline player_words {
+namespace sonocase {
 namespace {
 
 bool takes(std::string_view& line, std::string_view keyword) {
@@ -75,4 +76,51 @@ Language read_po(std::string_view text) {
     return language;
 }
 
-}  // namespace sonocase::runtime::inline player_words
+const std::string* Language::find(std::string_view english) const {
+    const auto found = std::lower_bound(
+        catalogue.begin(), catalogue.end(), english,
+        [](const Translation& t, std::string_view key) { return t.english < key; });
+    return found != catalogue.end() && found->english == english ? &found->other : nullptr;
+}
+
+std::string Language::words(std::string_view english) const {
+    const std::string* other = find(english);
+    return other ? *other : std::string(english);
+}
+
+std::string Language::words(const Message& message) const {
+    if (catalogue.empty()) return static_cast<const std::string&>(message);
+    if (message.arguments().empty()) return words(message.format());
+    std::vector<std::string> arguments;
+    for (const Message& argument : message.arguments()) arguments.push_back(words(argument));
+    return filled_in(words(message.format()), arguments);
+}
+
+std::span<const Language> languages() {
+    static const std::vector<Language> kLanguages = [] {
+        std::vector<Language> all{{"en", "English", {}}};
+        for (const std::string_view text : detail::catalogue_texts()) all.push_back(read_po(text));
+        return all;
+    }();
+    return kLanguages;
+}
+
+const Language& find_language(std::string_view code) {
+    for (const Language& language : languages()) {
+        const std::size_t end = language.code.size();
+        if (code.substr(0, end) == language.code &&
+            (code.size() == end || !std::isalpha(static_cast<unsigned char>(code[end]))))
+            return language;
+    }
+    return languages().front();
+}
+
+std::string locale_language() {
+    for (const char* name : {"LC_ALL", "LC_MESSAGES", "LANG"}) {
+        const char* value = std::getenv(name);
+        if (value && *value) return value;
+    }
+    return "en";
+}
+
+}  // namespace sonocase
