@@ -21,8 +21,8 @@ bool open_bundle(PlayerState& player,
 // Ends an attempt and lets go of tracker and engine.
 void close_bundle(PlayerState& player, CaseState& loaded, ScanState& scan);
 
-// Ends an attempt or a replay, and an exam set; opens at gain 0 with even depth gain. index: taken modulo the number of exercises, so
-// that one may step on from the last.
+// Ends an attempt or a replay, and an exam set; opens at gain 0 with even depth gain. index: taken
+// modulo the number of exercises, so that one may step on from the last.
 void choose_exercise(PlayerState& player, CaseState& loaded, ScanState& scan, int index);
 // "paper" or "physical".
 void choose_model(PlayerState& player,
