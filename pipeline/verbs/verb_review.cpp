@@ -41,9 +41,13 @@ int verb_review(int argc, char** argv) {
     app.add_flag("--no-progress", no_progress, "Compare with nothing");
     app.add_flag("--keep", keep, "Put the session into the progress book");
     options.language = locale_language();
-    app.add_option("--language", options.language, "Of the page: en, de; default: the locale's");
+    const auto* language = app.add_option("--language", options.language,
+                                          "Of the page: en, de; default: the locale's");
     add_common_options(app, common);
     if (const auto status = parse_command_line(app, argc, argv)) return *status;
+    if (language->count() > 0 &&
+        !options.language.starts_with(find_language(options.language).code))
+        return wrong_usage("review", "--language " + options.language + ": there are en and de");
     if (no_progress) options.progress_path.clear();
     options.threads = common.threads;
     ReviewInput input;

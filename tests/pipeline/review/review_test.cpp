@@ -240,6 +240,16 @@ TEST(Review, IsWrittenInTheLanguageOfItsReader) {
         EXPECT_EQ(page.find(words), std::string::npos) << words;
 }
 
+TEST(Review, ALanguageThatIsNotThereIsWrongUsage) {
+    Files files;
+    const auto said =
+        testing::run_command(SONOCASE_BIN "/sonocase review " + files.session + " --case " +
+                             files.bundle + " --language fr -o " + (files.folder / "review"));
+    EXPECT_EQ(said.status, 2);
+    EXPECT_NE(said.error.find("--language fr: there are en and de"), std::string::npos)
+        << said.error;
+}
+
 TEST(Review, AnotherCaseAndAMissingExerciseAreSaid) {
     Files files;
     Session s = insertion(30);
