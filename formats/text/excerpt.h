@@ -10,12 +10,13 @@
 
 namespace sonocase {
 
-// "liver, spleen, heart, aorta and 3 more". most: of the items named.
-inline std::string excerpt(std::span<const std::string> items, std::size_t most = 4) {
+// "liver, spleen, heart, aorta and 3 more". max_named: how many are named.
+inline std::string excerpt(std::span<const std::string> items, std::size_t max_named = 4) {
     std::string text;
-    for (std::size_t n = 0; n < std::min(most, items.size()); ++n)
+    for (std::size_t n = 0; n < std::min(max_named, items.size()); ++n)
         text += (n > 0 ? ", " : "") + items[n];
-    if (items.size() > most) text += " and " + std::to_string(items.size() - most) + " more";
+    if (items.size() > max_named)
+        text += " and " + std::to_string(items.size() - max_named) + " more";
     return text;
 }
 

@@ -34,7 +34,7 @@ constexpr double kFrontScore = 1.2;
 constexpr double kEqualScore = 1.04;
 // Poses that reach fewer readings are not told apart by how close the rest of them lie.
 constexpr double kJudgedCoverage = 0.5;
-// Of less of the skin than this, the side that the sweep is open to may as well be a flank. In
+// Where less of the skin than this was swept, the open side may as well be a flank's. In
 // windows of a front, poses that follow it fit at most 5 % worse than poses that are rolled away
 // from it, in strips of a flank 24 % worse or more.
 constexpr double kLittleSkin = 0.45, kFlankScore = 1.15;

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
@@ -80,7 +81,7 @@ namespace {
 
 constexpr float kNoHardMm = 1e9f;
 float per_reach() {
-    return static_cast<float>(1.4426950408889634 / PlaneLookUp::contact_reach_mm());
+    return static_cast<float>(std::numbers::log2e / PlaneLookUp::contact_reach_mm());
 }
 constexpr std::uint64_t kEachByte = 0x0101010101010101u;
 
@@ -205,7 +206,7 @@ void TruthRenderer::Impl::lay_out_rows(const Rigid& pose) {
         f.beam_z[a] = static_cast<float>(z[a]);
         f.shift_vx[a] = static_cast<float>(look_up.motion().breathing_mm[a] * per_mm);
     }
-    f.most_off_vx = static_cast<float>(kMostOffMm * per_mm);
+    f.max_off_vx = static_cast<float>(kMaxOffMm * per_mm);
     voxels.fill(f, region_rows);
     f.pulse_vx = static_cast<float>(look_up.motion().pulse_mm * per_mm);
     region_rows.pulse_vx = f.region_per_voxel * f.pulse_vx;

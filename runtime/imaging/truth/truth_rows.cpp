@@ -507,7 +507,7 @@ bool places_of_tile(const TruthFrameRows& f, const TruthTile& tile, TilePlaces& 
         places.lower[a] = std::min({v[0], v[1], v[2], w[0], w[1], w[2]}) - bulge;
         places.upper[a] = std::max({v[0], v[1], v[2], w[0], w[1], w[2]}) + bulge;
     }
-    return off <= f.most_off_vx;
+    return off <= f.max_off_vx;
 }
 
 template <bool kInside>

@@ -29,7 +29,7 @@ struct TruthFrameRows {
     // A pixel's voxel: origin + column * across + row * down; in double, rounded once per row.
     double origin[3], across[3], down[3];
     std::int32_t size[3];
-    float most_off_vx = 0;  // kMostOffMm
+    float max_off_vx = 0;  // kMaxOffMm
 
     // Voxels of the bundle. bricks: x fastest, and one more for all places outside. The pools and
     // boundary_uniform are BrickVolume's.
@@ -103,7 +103,7 @@ struct TilePlaces {
 // The places of a tile's pixels follow where those of its last two points do to within this: a
 // sixteenth of a pixel of 512 across a torso, and one step in which a boundary record of a voxel of
 // 1 mm holds where its surface lies.
-inline constexpr double kMostOffMm = 0.02;
+inline constexpr double kMaxOffMm = 0.02;
 
 // True where the places of all pixels follow from those of the points.
 bool truth_places(SimdTarget simd,

@@ -209,7 +209,7 @@ TEST(Truth, OnePixelAsksTheSameAsAllTogether) {
     }
 }
 
-// Places that follow from those of a tile's points are off by kMostOffMm at most where that is
+// Places that follow from those of a tile's points are off by kMaxOffMm at most where that is
 // tried, and by less than twice that in between: a pixel has the label of a place so near. One
 // place alone takes the gap of the nearest ray, half of 0.33 mm away at most, where gaps rise by
 // 0.1 mm per mm.

@@ -108,8 +108,8 @@ TEST(SessionRun, AReplayGivesTheSamePixelsToTheLastBit) {
     }
 }
 
-// Of two insertions, one that ends and one that does not, the review can show where the needle was
-// at its deepest.
+// One insertion ends and one does not: the review can show where the needle was at its deepest in
+// both.
 TEST(SessionRun, KeepsThePictureOfEachInsertionsDeepestPoint) {
     const testing::TemporaryFolder folder;
     const std::string path = folder / "s.igs.mha";

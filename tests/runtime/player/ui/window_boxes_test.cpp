@@ -409,7 +409,7 @@ TEST(WindowBoxes, NothingOverlapsOrIsCutAt1280) {
     check({{"1280x720", 1}, {"1280x720", 1.5}, {"1280x720", 2}});
 }
 
-// With sanitizers one size: the code is the same at all of them.
+// Sanitizers see one size: the code is the same at all of them.
 #ifndef __SANITIZE_ADDRESS__
 TEST(WindowBoxes, NothingOverlapsOrIsCutAt1920) {
     check({{"1920x1080", 1}, {"1920x1080", 1.5}});
