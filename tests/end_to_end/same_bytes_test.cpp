@@ -32,9 +32,9 @@ constexpr const char* kDraft = "105efb26f2865cd9b2746e3d6824abec";
 constexpr const char* kBalanced = "7dc885eb6cb26bf622cb417e7c22b6e9";
 constexpr const char* kSlender = "324ddbf1be953e25fc645cf17a308409";
 constexpr const char* kReal = "173a85e6e19dc11c0cca474f67f96ceb";
-constexpr const char* kDraftPhysical = "cc080cace11907e903dfd9a4e4730d38";
+constexpr const char* kDraftPhysical = "acca27b34d2f1d055af23bcc21d9e73e";
 constexpr const char* kDraftPaper = "1aaccd9bf66881ec2231c9c0ceb219e6";
-constexpr const char* kRealPhysical = "8b9e004ccece8675472529458202864f";
+constexpr const char* kRealPhysical = "a93b9816dc9e5cb9a036596e130601f0";
 constexpr const char* kRealPaper = "171f0dd55595047b8aebbc8803a1aecb";
 
 class SameBytes : public ::testing::Test {

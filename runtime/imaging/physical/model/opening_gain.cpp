@@ -14,10 +14,10 @@
 namespace sonocase::runtime::physical {
 namespace {
 
-constexpr int kBeams = 49;            // in the middle half of the picture
-constexpr std::size_t kPlaces = 8;    // of a script that looks around; they share the beams
-constexpr double kStepMm = 1;         // along a beam
-constexpr double kSkinMm = 4;         // what lies before the skin is that near to it
+constexpr int kBeams = 33, kOfMany = 24;  // in the middle half of a picture; of each of many
+constexpr std::size_t kPlaces = 8;        // of scripts that look around
+constexpr double kStepMm = 1;             // along a beam
+constexpr double kSkinMm = 4;             // what lies before the skin is that near to it
 constexpr double kSearchMm = 100;     // the skin is looked for this far before and beyond the place
 constexpr double kShadowDb = 24;      // a beam that is so much darker than tissue alone makes it
 constexpr double kFewest = 0.06;      // share of a depth that must hold tissue for it to count
@@ -128,6 +128,9 @@ class Brightness {
     explicit Brightness(const MachineGrey& grey)
         : grey_(grey), per_db_(grey.exponent / kDbPerLog2), log_(grey.map == GreyMap::log) {}
     double of(double db) const { return log_ ? db : std::exp2(per_db_ * db); }
+    double of_power(double power) const {
+        return of(0.5 * kDbPerLog2 * std::log2(std::max(power, 1e-30)));
+    }
     double level_db(double brightness) const {
         return log_ ? brightness : std::log2(std::max(brightness, 1e-9)) / per_db_;
     }
@@ -221,13 +224,15 @@ class Tracer {
           haze_gain_(tables.machine.haze.fraction * (1 - haze_keep_)),
           structure_(scene.bundle->labels.size()),
           gain_db_(static_cast<std::size_t>(geometry.depth_mm / kStepMm) + 1),
-          label_mm_(gain_db_.size()) {
+          label_mm_(gain_db_.size()),
+          gap_left_(gain_db_.size()) {
         for (std::size_t i = 0; i < gain_db_.size(); ++i) {
             const double r = (static_cast<double>(i) + 0.5) * kStepMm;
             const int sample = std::min(static_cast<int>(r / g_.step_mm), g_.samples - 1);
             const Row& row = tables.rows[static_cast<std::size_t>(sample)];
             gain_db_[i] = 20 * std::log10(row.gain);
             label_mm_[i] = row.label_mm;
+            gap_left_[i] = row.contact;
         }
     }
 
@@ -259,7 +264,7 @@ class Tracer {
             // Somewhere in the slab, as the renderer looks labels up: a rib that runs along the
             // plane, half in it, takes its share.
             const double aside = label_mm_[i] * kEighths[(5 * i + 3 * beam) % 8];
-            const double at = r + gap * std::exp(-r / kGapReachMm);
+            const double at = r + gap * gap_left_[i];
             const Point3 p = pose * Point3{o.x + at * d.x, aside, o.z + at * d.z};
             const int label = label_at(bundle_, p);
             if (label == kBeyond) break;
@@ -281,11 +286,12 @@ class Tracer {
             if (!structure.known)
                 structure =
                     structure_of(scene_, tables_, brightness_, static_cast<std::size_t>(label));
-            double echo_db = a.echo_db + structure.elsewhere;
-            if (walled_ && r < kWallDepthMm) echo_db = wall_db(a, structure, voxel, before);
-            const double power = power_of(echo_db - lost_db + gain_db_[i]);
+            const double light_db = gain_db_[i] - lost_db;
+            const double power = walled_ && r < kWallDepthMm
+                                     ? wall_power(a, structure, voxel, before) * power_of(light_db)
+                                     : power_of(a.echo_db + structure.elsewhere + light_db);
             haze += haze_gain_ * power;
-            const double level = brightness_.of(10 * std::log10(power + haze));
+            const double level = brightness_.of_power(power + haze);
             out.all.add(i, level);
             if (organ_[static_cast<std::size_t>(label)]) out.organ.add(i, level);
         }
@@ -296,11 +302,11 @@ class Tracer {
             if (label_at(bundle_, pose * Point3{o.x + r * d.x, 0, o.z + r * d.z}) > 0) return r;
         return kMaxGapMm;
     }
-    // Level of the wall's ground with its sheets, as reference_beams.cpp adds them.
-    double wall_db(const AcousticProperties& a,
-                   const StructureDb& structure,
-                   Point3 voxel,
-                   WallPlace& before) const {
+    // Of the wall's ground with its sheets, as reference_beams.cpp adds them.
+    double wall_power(const AcousticProperties& a,
+                      const StructureDb& structure,
+                      Point3 voxel,
+                      WallPlace& before) const {
         const WallTables& wall = tables_.wall;
         const WallPlace at = wall_place(scene_.layers, wall, voxel);
         const auto sheet = [&](const SheetTable& table, double mm, double before_mm) {
@@ -315,7 +321,7 @@ class Tracer {
         const double ground_db = a.echo_db + a.wall_db +
                                  (at.above > 0 ? structure.wall : structure.elsewhere) +
                                  wall_ground_db(wall, at.depth, at.above);
-        return 10 * std::log10(power_of(ground_db) + sheets * sheets);
+        return power_of(ground_db) + sheets * sheets;
     }
     double loss_db(const AcousticProperties& a) const {
         return 0.2 * a.attenuation * tables_.frequency_mhz * kStepMm;
@@ -328,9 +334,9 @@ class Tracer {
     std::vector<bool> organ_;
     bool walled_;
     Brightness brightness_;
-    double haze_keep_, haze_gain_;            // from a step to the next
-    std::vector<StructureDb> structure_;      // # labels
-    std::vector<double> gain_db_, label_mm_;  // by depth
+    double haze_keep_, haze_gain_;                       // from a step to the next
+    std::vector<StructureDb> structure_;                 // # labels
+    std::vector<double> gain_db_, label_mm_, gap_left_;  // by depth
 };
 
 // The even level whose grey is the mean of these.
@@ -388,7 +394,7 @@ OpeningGain opening_gain(const PhysicalScene& scene,
     if (planes.empty()) return out;
     Tracer tracer(scene, exercise, tables, g);
     const Brightness brightness(tables.machine.grey);
-    const int beams = planes.size() > 2 ? kBeams / 2 : kBeams;
+    const int beams = planes.size() > 2 ? kOfMany : kBeams;
     std::vector<PlaneLevels> levels;
     std::array<double, 8> sum{}, count{};
     double whole = 0;
