@@ -31,7 +31,7 @@ constexpr double kOppositeBothWays = 1.03;
 constexpr double kFrontScore = 1.2;
 // Typical gaps of turned heads are 0.86 to 2.55 times those of right ones (40 of other builds read
 // all round), of the front 1.06 to 1.97 times (40).
-constexpr double kFreeConstraintMm = 3, kTypicalGap = 1.25;
+constexpr double kFreeConstraintMm = 3, kTypicalGap = 1.25, kSameTypicalGap = 1.05;
 // A pose's score moves by some 4 % with the start that found it, so that scores nearer to each
 // other are equal. Then the pose whose skin lay closer before it was deformed is the better one.
 constexpr double kEqualScore = 1.04;
@@ -498,12 +498,21 @@ void check_head(const FitContext& s,
         "fits to %.2f mm the other way and to %.2f mm as given (%.2f and %.2f mm before the "
         "warp)",
         score, best, rigid_score, rigid_best);
-    if (verdict == Verdict::untold && !may_mislead && choice->best.skin_coverage >= kLittleSkin) {
-        const double typical = typical_gap_mm(s, given, choice->best.rigid.target_from_skin),
-                     turned_typical = typical_gap_mm(s, turned, opposite);
-        if (std::isfinite(typical) && std::isfinite(turned_typical)) {
-            verdict = verdict_of(typical, turned_typical, kTypicalGap);
+    // What the scores tell holds if the typical gaps say the same; where they tell nothing, typical
+    // gaps that differ clearly do. Of a pose that has slid off nothing is known.
+    const double typical = typical_gap_mm(s, given, choice->best.rigid.target_from_skin),
+                 turned_typical = typical_gap_mm(s, turned, opposite);
+    const bool reached = std::isfinite(typical) && std::isfinite(turned_typical);
+    if (choice->best.skin_coverage < kLittleSkin) {
+        if (!reached) verdict = Verdict::untold;
+    } else if (reached) {
+        if (verdict == Verdict::untold && !may_mislead) {
+            const Verdict clear = verdict_of(typical, turned_typical, kTypicalGap);
+            const Verdict by_score = verdict_of(best, score, kEqualScore);
+            if (by_score == Verdict::untold || by_score == clear) verdict = clear;
             scores += text(", half of the readings to %.2f and %.2f mm", turned_typical, typical);
+        } else if (verdict != verdict_of(typical, turned_typical, kSameTypicalGap)) {
+            verdict = Verdict::untold;
         }
     }
     if (verdict == Verdict::wrong) {

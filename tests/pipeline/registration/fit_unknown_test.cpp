@@ -272,6 +272,8 @@ TEST(FitUnknown, AFitThatHasSlidOffItsReadingsKnowsHowFarTheyAre) {
     ASSERT_TRUE(fitted) << fitted.error().message();
     EXPECT_LT(fitted->fit.coverage, 0.5);
     EXPECT_LT(fitted->fit.skin_coverage, 0.5);
+    // The head is given rightly, and the search found a better fit the other way.
+    EXPECT_TRUE(note(*fitted, "head").starts_with("not told")) << note(*fitted, "head");
     HardCase slid("error of any structure over the 90 % said of it, slid off the readings",
                   HardCase::at_most, 1, "");
     for (const OrganUnknown& u : fitted->unknown)
@@ -361,8 +363,10 @@ TEST(FitUnknown, DISABLED_CalibrationOfSixtyFits) {
 TEST(FitUnknown, DISABLED_HeadsOfSixtyOtherBodies) {
     const char* given = std::getenv("SONOCASE_CALIBRATION_SEED");
     const std::uint64_t seed = given ? std::strtoull(given, nullptr, 10) : 1;
+    const char* one = std::getenv("SONOCASE_CALIBRATION_CASE");
     int alarms = 0, right = 0, named = 0, called_right = 0;
     for (int n = 0; n < 60; ++n) {
+        if (one && n != std::atoi(one)) continue;
         KnownCase c = known_case(n, seed, Kind::others);
         c.options.landmarks.clear();
         for (const double sign : {1.0, -1.0}) {

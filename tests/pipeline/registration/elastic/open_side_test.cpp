@@ -428,7 +428,7 @@ TEST(HeadDirection, OfPartsOfTheSharedSweepIsNotCalledRightWhereItIsTurned) {
     none.see(alarms);
     HardCase right("of 10 with the head turned, called right", HardCase::at_most, 0, "");
     right.see(called_right);
-    HardCase told("of 10 with the head turned, named", HardCase::at_least, 5, "");
+    HardCase told("of 10 with the head turned, named", HardCase::at_least, 3, "");
     told.see(named);
 }
 
