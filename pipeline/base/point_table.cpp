@@ -695,7 +695,9 @@ class Parser {
     Status read_nameless(PointTable& table) {
         std::size_t count = 0;
         bool first_is_word = false;
-        bool unit_normals = true, colours = true, whole = true;
+        bool unit_normals = true, colours = true, whole = true, ascends = true;
+        // A scanner's points (PTS): their number above x, y, z, intensity, or those and a colour.
+        bool scanned = false;
         std::vector<double> first_column;
         const Line* first_line = nullptr;
         for (std::size_t n = layout_.first; n < lines_.size(); ++n) {
@@ -707,11 +709,12 @@ class Parser {
                 count = cells_.size();
                 first_is_word = !cells_.number(0);
                 const bool named = count == 4 && (first_is_word || options_.names);
+                scanned = layout_.stated >= kFewRows && !named && (count == 4 || count == 7);
                 if (count < 3)
                     return Error{"row of " + std::to_string(count) + " cells", place(line),
                                  "expected x, y and z"};
                 if (cells_.numbers() + first_is_word != count ||
-                    (count != 3 && count != 6 && !named) || (first_is_word && !named))
+                    (count != 3 && count != 6 && !named && !scanned) || (first_is_word && !named))
                     return which_columns(
                         count,
                         std::to_string(count) + " columns have no names: " + cell_list(cells_),
@@ -726,14 +729,17 @@ class Parser {
                 return Error{"row of " + std::to_string(cells_.size()) + " cells after rows of " +
                                  std::to_string(count),
                              place(line), "give every row the same columns"};
-            if (const auto value = cells_.number(0)) first_column.push_back(*value);
+            if (const auto value = cells_.number(0)) {
+                ascends = ascends && (first_column.empty() || *value > first_column.back());
+                first_column.push_back(*value);
+            }
             for (std::size_t c = 0; c < 3 && whole; ++c) {
                 const auto value = cells_.number(c);
                 whole = !value || (*value == std::floor(*value) && is_digits(cells_[c]));
             }
-            if (count == 6) {
+            if (count >= 6) {
                 double square = 0;
-                for (std::size_t c = 3; c < 6; ++c) {
+                for (std::size_t c = count - 3; c < count; ++c) {
                     const double v = cells_.number(c).value_or(kNan);
                     square += v * v;
                     colours = colours && v >= 0 && v <= 255 && v == std::floor(v);
@@ -767,7 +773,10 @@ class Parser {
                                          place(*first_line));
             return Done{};
         }
-        if ((count == 6 && !unit_normals && !colours) || (count != 4 && counts_up(first_column)))
+        // Numbers and times ascend.
+        const bool other =
+            scanned ? ascends || (count == 7 && !colours) : count == 6 && !unit_normals && !colours;
+        if (other || (count != 4 && counts_up(first_column)))
             return which_columns(
                 count,
                 (counts_up(first_column) ? "The first column counts upwards: "

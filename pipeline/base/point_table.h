@@ -36,7 +36,8 @@ struct PointTableOptions {
 // Rotation. Units stand in the names (x_mm, "X (m)"), in a row below them, or in the metadata.
 //
 // Without names, three columns are x, y, z; four whose first is a word are a name and x, y, z; six
-// are x, y, z and unit normals, or x, y, z and colours of whole numbers up to 255.
+// are x, y, z and unit normals, or x, y, z and colours of whole numbers up to 255. Four or seven
+// below a line with their number are a scanner's (PTS): x, y, z, intensity and a colour.
 //
 // Rows that a column status, state, valid or tracked calls bad have no position, nor have those of
 // 0, 0, 0 where there are several, and of numbers beyond 1e12 (NDI).

@@ -56,7 +56,7 @@ Status check_source_file(const std::string& path, const std::string& expected) {
     return expect_no_foreign(path);
 }
 
-std::optional<Error> foreign_format(const std::string& path) {
+std::optional<Error> foreign_format(const std::string& path, Wanted wanted) {
     struct Format {
         std::string_view ending;
         const char* kind;
@@ -65,6 +65,8 @@ std::optional<Error> foreign_format(const std::string& path) {
     constexpr const char* kSurface =
         "export it as .glb, .stl, .ply or .obj; organs as one .glb or a folder of .stl";
     constexpr const char* kVolume = "write it as .nii.gz or .nrrd (3D Slicer, nibabel)";
+    constexpr const char* kPoints =
+        "expected the skin: a mesh (.ply, .stl, .obj), or points as CSV below a line 'x,y,z'";
     constexpr const char* kUnpack = "unpack it, and give what it holds";
     constexpr Format kFormats[] = {
         {".gltf", "glTF whose parts may lie in several files", "export it as one .glb"},
@@ -90,13 +92,13 @@ std::optional<Error> foreign_format(const std::string& path) {
         {".mnc", "a MINC volume", kVolume},
         {".gipl", "a GIPL volume", kVolume},
         {".vti", "a volume of VTK", kVolume},
-        {".npy", "an array of NumPy, which has no geometry", kVolume},
-        {".npz", "arrays of NumPy, which have no geometry", kVolume},
+        {".npy", "an array of NumPy", kVolume},
+        {".npz", "arrays of NumPy", kVolume},
         {".mat", "data of MATLAB", kVolume},
         {".h5", "an HDF5 file", kVolume},
         {".hdf5", "an HDF5 file", kVolume},
-        {".tif", "a TIFF picture, which has no geometry", kVolume},
-        {".tiff", "a TIFF picture, which has no geometry", kVolume},
+        {".tif", "a TIFF picture", kVolume},
+        {".tiff", "a TIFF picture", kVolume},
         {".raw", "voxels without a header", "give the header beside it (.mhd or .nhdr)"},
         {".zraw", "voxels without a header", "give the header beside it (.mhd)"},
         {".mrb", "a scene of 3D Slicer", "save the segmentation itself, as .seg.nrrd"},
@@ -112,9 +114,11 @@ std::optional<Error> foreign_format(const std::string& path) {
     const std::string name = lower_case(path);
     for (const Format& format : kFormats)
         if (name.ends_with(format.ending))
-            return Error{std::string("is ") + format.kind + " (" + std::string(format.ending) +
-                             "), which is not read",
-                         path, format.advice};
+            return Error{
+                std::string("is ") + format.kind + " (" + std::string(format.ending) +
+                    "), which is not read",
+                path,
+                wanted == Wanted::surface && format.advice == kVolume ? kPoints : format.advice};
     return std::nullopt;
 }
 

@@ -24,7 +24,8 @@ Status check_source_file(const std::string& path, const std::string& expected);
 
 // What a file of a format that no reader here takes is by its name, and how to bring what it holds;
 // nothing for other names.
-std::optional<Error> foreign_format(const std::string& path);
+enum class Wanted { volume, surface };
+std::optional<Error> foreign_format(const std::string& path, Wanted wanted);
 
 // Done if the folder's own entries are files and folders only, so that a library that opens every
 // entry comes to an end. Subfolders are not looked into.

@@ -18,7 +18,6 @@
 #include "pipeline/check/aim.h"
 #include "pipeline/check/case_labels.h"
 #include "pipeline/check/scripted_expert.h"
-#include "pipeline/export/error_budget.h"
 #include "pipeline/export/inspect_case.h"
 
 namespace sonocase::pipeline::inline check {
@@ -544,9 +543,6 @@ void check_fit(const CaseBundle& bundle, CheckResult& result) {
                                          "fit again: look at the pose, give landmarks"});
         for (const std::string& warning : report.warnings)
             result.remarks.push_back(report.stage + ": " + warning);
-        for (const Note& note : report.notes)
-            if (is_untold(note))
-                result.remarks.push_back(report.stage + ": " + note.name + ": " + note.text);
     }
 }
 

@@ -56,11 +56,6 @@ ErrorBudget error_budget(std::span<const StageReport> stages) {
     return budget;
 }
 
-bool is_untold(const Note& note) {
-    const bool of_pose = note.name == "head" || note.name == "handedness" || note.name == "front";
-    return of_pose && !note.text.starts_with("right");
-}
-
 std::vector<UnknownPlace> unknown_places(std::span<const StageReport> stages) {
     std::vector<UnknownPlace> places;
     for (const StageReport& report : stages) {

@@ -72,8 +72,4 @@ ErrorBudget error_budget(std::span<const StageReport> stages);
 inline constexpr double kSampledShare = 0.085;
 inline constexpr double kCookedShare = 0.05;
 
-// Whether a note of the fit says that the skin does not tell head from feet, right from left or
-// front from back ("head", "handedness", "front"; pipeline/registration/pose_choice.h).
-bool is_untold(const Note& note);
-
 }  // namespace sonocase::pipeline::inline exporting

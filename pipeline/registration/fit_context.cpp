@@ -97,6 +97,7 @@ Result<FitContext> prepare_fit(const RegisterInput& input, const RegisterOptions
     s.box.include(Point3{} + (input.skin.box.lower - origin));
     s.box.include(Point3{} + (input.skin.box.upper - origin));
     s.readings = thin_target(s.target, 0);
+    s.motion = find_sweep_motion(s.target);
     if (options.up) {
         const double length = norm(*options.up);
         if (!(length > 1e-6) || !std::isfinite(length)) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pipeline/registration/fit/open_side.h"
+#include "pipeline/registration/fit/sweep_motion.h"
 #include "pipeline/registration/register_surfaces.h"
 
 namespace sonocase::pipeline::inline registration {
@@ -22,6 +23,7 @@ struct FitContext {
     OpenSide open_side{};
     std::string open_side_is{};   // "back", "front" or "none": which side of the patient that is
     std::string open_side_why{};  // in words
+    SweepMotion motion{};
     const LabelVolume* labels = nullptr;  // null: not known
     std::vector<Point3> inside{};  // of the body, where the organs are; ct, relative to the origin
 };

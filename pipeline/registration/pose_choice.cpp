@@ -29,6 +29,9 @@ constexpr double kOppositeScore = 1.06, kOppositeScoreOfPart = 1.2, kWholeCovera
 // better to 24 % worse, and turned ones 14 % better to 19 % worse: nothing tells them apart.
 constexpr double kOppositeBothWays = 1.03;
 constexpr double kFrontScore = 1.2;
+// Typical gaps of turned heads are 0.86 to 2.55 times those of right ones (40 of other builds read
+// all round), of the front 1.06 to 1.97 times (40).
+constexpr double kFreeConstraintMm = 3, kTypicalGap = 1.25, kSameTypicalGap = 1.05;
 // A pose's score moves by some 4 % with the start that found it, so that scores nearer to each
 // other are equal. Then the pose whose skin lay closer before it was deformed is the better one.
 constexpr double kEqualScore = 1.04;
@@ -57,6 +60,24 @@ ResidualOptions judging_field() {
     return field;
 }
 
+// Evenly thinned, at most 900.
+std::vector<std::uint32_t> judged_readings(const TargetSurface& target) {
+    std::vector<std::uint32_t> readings = thin_target(target, 1.2 * target.spacing_mm);
+    if (readings.size() <= 900) return readings;
+    std::vector<std::uint32_t> fewer;
+    for (std::size_t n = 0; n < 900; ++n) fewer.push_back(readings[n * readings.size() / 900]);
+    return fewer;
+}
+
+RefineOptions judging_quadratic(const Given& given) {
+    RefineOptions options;
+    options.skin_queries = 900;
+    options.iterations = 5;
+    options.landmarks = given.landmarks;
+    options.landmark_weight = given.hints.landmark_weight;
+    return options;
+}
+
 double penalty(double gap) {
     return kJudgeScaleMm * kJudgeScaleMm * std::log1p(gap * gap / (kJudgeScaleMm * kJudgeScaleMm));
 }
@@ -71,20 +92,11 @@ JudgedPose judge(const FitContext& s,
     JudgedPose judged;
     judged.rigid = rigid;
     judged.quadratic = RigidQuadratic::from_rigid(rigid.target_from_skin);
-    std::vector<std::uint32_t> readings = thin_target(target, 1.2 * target.spacing_mm);
-    if (readings.size() > 900) {
-        std::vector<std::uint32_t> fewer;
-        for (std::size_t n = 0; n < 900; ++n) fewer.push_back(readings[n * readings.size() / 900]);
-        readings = std::move(fewer);
-    }
-    RefineOptions options;
-    options.skin_queries = 900;
-    options.landmarks = given.landmarks;
-    options.landmark_weight = given.hints.landmark_weight;
+    const std::vector<std::uint32_t> readings = judged_readings(target);
+    RefineOptions options = judging_quadratic(given);
     double deformation = 0;
     for (double constraint : {3 * kJudgeConstraintMm, kJudgeConstraintMm}) {
         options.constraint_mm = constraint;
-        options.iterations = 5;
         const RefineResult refined =
             refine_quadratic(s.coarse, target, readings, judged.quadratic, options);
         judged.quadratic = refined.map;
@@ -399,11 +411,46 @@ void check_hands(const FitContext& s,
     }
 }
 
+// How near half of the readings lie to the skin, after a stiff and after a freer quadratic: the
+// geometric mean of both medians. Another build differs in a part of the skin, which costs in a
+// mean what the whole of the skin tells; a median leaves that part out.
+double typical_gap_mm(const FitContext& s, const Given& given, const Rigid& pose) {
+    const std::vector<std::uint32_t> readings = judged_readings(s.target);
+    RefineOptions options = judging_quadratic(given);
+    RigidQuadratic map = RigidQuadratic::from_rigid(pose);
+    double product = 1;
+    for (const double constraint :
+         {3 * kJudgeConstraintMm, kJudgeConstraintMm, kFreeConstraintMm}) {
+        options.constraint_mm = constraint;
+        map = refine_quadratic(s.coarse, s.target, readings, map, options).map;
+        options.first_loss_mm = 5;
+        if (constraint == kJudgeConstraintMm) continue;
+        MatchOptions gates;
+        gates.farthest_mm = options.last_gate_mm;
+        gates.side_step_mm = 1.2 * s.target.spacing_mm;
+        const MappedSkin mapped = map_skin(s.coarse, map);
+        std::vector<double> gaps;
+        for (const Match& m : find_matches(s.coarse, mapped.points, mapped.normals, mapped.index,
+                                           s.target, readings, 0, gates)
+                                  .from_target)
+            gaps.push_back(std::abs(m.gap_mm));
+        if (static_cast<double>(gaps.size()) <
+            kJudgedCoverage * static_cast<double>(readings.size()))
+            return INFINITY;
+        const auto middle = gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2);
+        std::nth_element(gaps.begin(), middle, gaps.end());
+        product *= std::max(*middle, 0.1);
+    }
+    return std::sqrt(product);
+}
+
 // The head the other way than was said.
+// side_is_assumed  nobody said which side of the patient the sweep is open to
 void check_head(const FitContext& s,
                 const Given& given,
                 const SplinePenalty& field,
                 const RigidOptions& options,
+                bool side_is_assumed,
                 const Progress& progress,
                 PoseChoice* choice) {
     if (!given.hints.up) {
@@ -420,15 +467,20 @@ void check_head(const FitContext& s,
     RigidOptions rigid = options;
     rigid.starts = std::max(1, rigid.starts / kFewerStarts);
     double score = INFINITY, rigid_score = INFINITY;
+    Rigid opposite;
     for (const JudgedPose& p : judge_candidates(s, s.target, turned, field, rigid, progress)) {
         if (p.score_mm >= score) continue;
         score = p.score_mm;
         rigid_score = p.rigid.score_mm;
+        opposite = p.rigid.target_from_skin;
     }
     const double best = choice->best.score_mm, rigid_best = choice->best.rigid.score_mm;
     Verdict verdict = verdict_of(best, score, margin_of(choice->best, kOppositeScore));
-    if (verdict == Verdict::right && choice->best.skin_coverage < kLittleSkin && given.hints.back) {
-        // Not while it follows the open side, which may be a flank's.
+    // Not while the opposite follows the open side, which may be a flank's, or the front of a
+    // patient whose back was swept.
+    const bool may_mislead = verdict == Verdict::right && given.hints.back &&
+                             choice->best.skin_coverage < kWholeCoverage;
+    if (may_mislead) {
         const JudgedPose other =
             judge_without_open_side(s, turned, field, options, progress).front();
         if (other.score_mm < score) {
@@ -442,16 +494,40 @@ void check_head(const FitContext& s,
     if (verdict == Verdict::untold && choice->best.skin_coverage >= kWholeCoverage &&
         best * rigid_best > kOppositeBothWays * score * rigid_score)
         verdict = Verdict::wrong;
-    const std::string scores = text(
+    std::string scores = text(
         "fits to %.2f mm the other way and to %.2f mm as given (%.2f and %.2f mm before the "
         "warp)",
         score, best, rigid_score, rigid_best);
+    // What the scores tell holds if the typical gaps say the same; where they tell nothing, typical
+    // gaps that differ clearly do. Of a pose that has slid off nothing is known.
+    const double typical = typical_gap_mm(s, given, choice->best.rigid.target_from_skin),
+                 turned_typical = typical_gap_mm(s, turned, opposite);
+    const bool reached = std::isfinite(typical) && std::isfinite(turned_typical);
+    if (choice->best.skin_coverage < kLittleSkin) {
+        if (!reached) verdict = Verdict::untold;
+    } else if (reached) {
+        if (verdict == Verdict::untold && !may_mislead) {
+            const Verdict clear = verdict_of(typical, turned_typical, kTypicalGap);
+            const Verdict by_score = verdict_of(best, score, kEqualScore);
+            if (by_score == Verdict::untold || by_score == clear) verdict = clear;
+            scores += text(", half of the readings to %.2f and %.2f mm", turned_typical, typical);
+        } else if (verdict != verdict_of(typical, turned_typical, kSameTypicalGap)) {
+            verdict = Verdict::untold;
+        }
+    }
     if (verdict == Verdict::wrong) {
+        // Where the head as given fits as well without the open side, one of the two is wrong.
+        const bool either =
+            given.hints.back && side_is_assumed && choice->best.skin_coverage < kWholeCoverage &&
+            verdict_of(judge_without_open_side(s, given, field, options, progress).front().score_mm,
+                       score, kOppositeScoreOfPart) != Verdict::wrong;
         choice->head = "wrong: it " + scores;
-        choice->warnings.push_back("the head direction seems to point to the feet: the skin " +
-                                   scores +
-                                   "; turn its sign (--up), or give two landmarks such as crotch "
-                                   "and navel if it is right (--landmarks FILE.csv)");
+        choice->warnings.push_back(
+            "the head direction seems to point to the feet" +
+            std::string(either ? ", or the sweep to be of the patient's back" : "") +
+            ": the skin " + scores + "; turn its sign (--up), " +
+            (either ? "say --open-side front for a patient who lies prone, " : "") +
+            "or give two landmarks such as crotch and navel if it is right (--landmarks FILE.csv)");
     } else if (verdict == Verdict::untold && given.landmarks.size() < 2) {
         choice->head = "not told by the skin: it " + scores +
                        "; two landmarks such as crotch and navel would tell (--landmarks FILE.csv)";
@@ -512,6 +588,44 @@ void check_front(const FitContext& s,
     }
 }
 
+// "a", "a and b", "a, b and c".
+std::string listed(const std::vector<std::string>& items) {
+    std::string all;
+    for (std::size_t n = 0; n < items.size(); ++n)
+        all += (n == 0 ? "" : n + 1 < items.size() ? ", " : " and ") + items[n];
+    return all;
+}
+
+// One sentence for all that the skin leaves open, and what settles it: nothing else shows a fit
+// that is wrong there.
+void warn_of_untold(const FitContext& s, PoseChoice* choice) {
+    const auto untold = [](const std::string& note) {
+        return note.starts_with("not told") || note.starts_with("told by the open side");
+    };
+    std::vector<std::string> open, unseen, marks;
+    if (untold(choice->head)) {
+        open.push_back("head from feet");
+        unseen.push_back(s.hints.up ? "a head direction with its sign turned (--up)"
+                                    : "a patient upside down");
+        marks.push_back(s.hints.up ? "crotch and navel" : "crotch and navel (or --up X,Y,Z)");
+    }
+    if (untold(choice->handedness)) {
+        open.push_back("right from left");
+        unseen.push_back("a surface with left-handed axes");
+        marks.push_back("a hip");
+    }
+    if (untold(choice->front)) {
+        open.push_back("front from back");
+        unseen.push_back("a patient turned front to back");
+        marks.push_back("a place on the back");
+    }
+    if (open.empty()) return;
+    choice->warnings.insert(
+        choice->warnings.begin(),
+        "not verified: the skin does not tell " + listed(open) + ", so that " + listed(unseen) +
+            " would fit as well; landmarks settle it (--landmarks FILE.csv): " + listed(marks));
+}
+
 }  // namespace
 
 PoseChoice choose_pose(const FitContext& s,
@@ -545,9 +659,11 @@ PoseChoice choose_pose(const FitContext& s,
     warn_of_runners_up(s, &choice);
     if (choice.open_side_dropped) given.hints.back.reset();
     rigid.starts = options.rigid.starts;
-    check_head(s, given, field, rigid, progress, &choice);
+    check_head(s, given, field, rigid, options.open_side == "auto" && !s.target.table.found,
+               progress, &choice);
     check_hands(s, given, field, rigid, judged, progress, &choice);
     check_front(s, given, field, rigid, judged, &choice);
+    warn_of_untold(s, &choice);
     return choice;
 }
 

@@ -109,6 +109,22 @@ void warn_of_readings(StageReport& report, const FitContext& s, const FitMeasure
     }
 }
 
+// Readings of two poses, which one map cannot fit. Parts that meet along a border alone show that
+// they do not fit each other, and hardly by how much they moved.
+void warn_of_motion(StageReport& report, const FitContext& s) {
+    constexpr double kMeasured = 0.5;  // share of the smaller part that both were read in
+    const SweepMotion& m = s.motion;
+    if (!m.found) return;
+    const std::string by =
+        m.overlap > kMeasured ? text(" by %.0f mm and %.1f degrees", m.shift_mm, m.turn_deg) : "";
+    report.warnings.push_back(
+        text("the mannequin, or what the tracker's frame hangs on, moved while it was swept%s, "
+             "from about reading %ld on: the surfaces before and after lie %.1f mm apart, and "
+             "%.1f mm if that is undone; sweep again with both held fast, or leave out one part",
+             by.c_str(), static_cast<long>(s.target.given_as[m.first_after]) + 1, m.gap_mm,
+             m.closed_gap_mm));
+}
+
 // How wide and how deep the readings are, in ratio to the patient who lies so: the middle nine
 // tenths of both.
 std::array<double, 2> size_ratios(const FitContext& s, const Rigid& pose) {
@@ -182,6 +198,8 @@ StageReport align_report(const FitContext& s,
     report.measures.push_back({"front_turned_score_mm", choice.front_turned_score_mm});
     report.measures.push_back({"starts_at_pose", static_cast<double>(choice.best.rigid.found)});
     report.measures.push_back({"open_side_size", s.open_side.size});
+    report.measures.push_back({"moved_mm", s.motion.found ? s.motion.shift_mm : 0});
+    report.measures.push_back({"moved_deg", s.motion.found ? s.motion.turn_deg : 0});
     if (choice.open_side_dropped) {
         report.notes = {
             {"open_side", "none"},
@@ -200,6 +218,7 @@ StageReport align_report(const FitContext& s,
         report.measures.push_back({"runner_up_coverage", r.coverage});
     }
     report.warnings = choice.warnings;
+    warn_of_motion(report, s);
     return report;
 }
 

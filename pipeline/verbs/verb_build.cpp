@@ -349,10 +349,6 @@ int build_one(const BuildOptions& options) {
         return fail("build", status.error());
     for (const StageRun& run : cooked->stages) {
         print_notes("build", run.report);
-        for (const Note& note : run.report.notes)
-            if (is_untold(note))
-                std::fprintf(stderr, "sonocase build: %s: %s\n", note.name.c_str(),
-                             note.text.c_str());
         print_warnings("build", with_cache_notes(run));
     }
     if (!achieved.missed.empty())

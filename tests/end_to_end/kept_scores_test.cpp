@@ -78,7 +78,9 @@ class KeptScores : public ::testing::Test {
         auto book = ProgressBook::open(book_);
         ASSERT_TRUE(book) << book.error().message();
         tell(book_, "PRAGMA journal_mode=MEMORY");
-        ProgressEntry entry{0, "Bob", "demo", "liver", "", "", true, 1, {}};
+        ProgressEntry entry;
+        entry.trainee = "Bob", entry.case_name = "demo", entry.exercise = "liver";
+        entry.passed = true;
         for (const char* metric : {"elapsed_time_s", "targets_hit", "final_tip_to_target_mm"})
             entry.metrics.push_back({metric, 1.5});
         for (int i = 0; i < sessions; ++i) {

@@ -17,6 +17,7 @@
 #include <functional>
 #include <sstream>
 
+#include "formats/exercise/organ_of_interest.h"
 #include "formats/files/load_save.h"
 #include "formats/machine/machine.h"
 #include "formats/scoring/anatomy.h"
@@ -38,6 +39,7 @@ using runtime::Renderer;
 
 constexpr int kSize = 512;
 constexpr int kBeams = 128, kPenumbra = 2;  // of kBeams
+constexpr double kNearMm = 20, kWhite = 240;
 
 struct Moments {
     double sum = 0, square = 0, n = 0;
@@ -58,7 +60,8 @@ class Picture {
           exercise_(exercise),
           skin_(bundle),
           anatomy_(bundle),
-          tissue_of_(tissue_of_label(bundle)) {
+          tissue_of_(tissue_of_label(bundle)),
+          organ_(organ_of_interest(bundle, exercise)) {
         runtime::RenderOptions options;
         options.width_px = options.height_px = kSize;
         if (machine == "paper") {
@@ -91,6 +94,30 @@ class Picture {
             return runtime::sweep_pose(sweep, at, &skin_).mannequin_from_probe;
         }
         return start();
+    }
+    // The planes that the exercise's own script holds: with a needle in each target, or its keys.
+    std::vector<std::pair<std::string, Rigid>> planes() const {
+        std::vector<std::pair<std::string, Rigid>> out{{"start", start()}};
+        bool needle = false;
+        for (const Sweep& sweep : exercise_.sweeps) needle = needle || sweep.name == "needle";
+        if (needle) {
+            out.emplace_back("needle", scripted());
+            return out;
+        }
+        const auto near = [](const Rigid& a, const Rigid& b) {
+            return norm(a.translation - b.translation) < 2 &&
+                   norm(a.rotation * Vector3{1, 1, 1} - b.rotation * Vector3{1, 1, 1}) < 0.05;
+        };
+        for (const Sweep& sweep : exercise_.sweeps) {
+            for (std::size_t k = 0; k < sweep.keys.size(); ++k) {
+                const Rigid pose =
+                    runtime::sweep_pose(sweep, sweep.keys[k].time_s, &skin_).mannequin_from_probe;
+                if (std::none_of(out.begin(), out.end(),
+                                 [&](const auto& other) { return near(other.second, pose); }))
+                    out.emplace_back(sweep.name + std::to_string(k), pose);
+            }
+        }
+        return out;
     }
     Rigid scripted(const std::string& name, double time_s) const {
         for (const Sweep& sweep : exercise_.sweeps)
@@ -125,6 +152,56 @@ class Picture {
         }
         return out.mean();
     }
+    // Grey in the middle half of the picture where sound reaches soft tissue, clear of targets.
+    struct Levels {
+        Moments organ, tissue;  // of interest; all of it
+        double median = 0;      // of the organ
+        double share = 0;       // of the picture that the organ is
+        Moments near, far;      // tissue in the first kNearMm; the organ in its deepest fifth
+        double white = 0;       // share of the near tissue
+    };
+    Levels levels() const {
+        Levels out;
+        std::vector<std::pair<double, double>> organ;  // depth, grey
+        double all = 0;
+        const auto layout = renderer_->layout();
+        for (int y = 0; y < kSize; ++y) {
+            for (int x = 0; x < kSize; ++x) {
+                const Point3 in_plane{(x + 0.5 - layout.origin_x_px) * layout.mm_per_px, 0,
+                                      (y + 0.5 - layout.origin_y_px) * layout.mm_per_px};
+                if (!in_sector(in_plane)) continue;
+                const auto [share, depth] = on_face(in_plane);
+                if (std::abs(share - 0.5) > 0.25) continue;
+                all += 1;
+                if (in_shadow(in_plane)) continue;
+                const Point3 rest = renderer_->at_rest(pose_ * in_plane);
+                const int label = anatomy_.label(rest);
+                if (!soft(label) || in_target(rest)) continue;
+                const double grey = pixel(x, y);
+                out.tissue.add(grey);
+                if (depth < kNearMm) out.near.add(grey);
+                if (depth < kNearMm && grey >= kWhite) out.white += 1;
+                if (organ_[static_cast<std::size_t>(label)]) organ.emplace_back(depth, grey);
+            }
+        }
+        out.white /= std::max(out.near.n, 1.0);
+        out.share = static_cast<double>(organ.size()) / all;
+        if (organ.empty()) return out;
+        std::sort(organ.begin(), organ.end());
+        std::vector<double> greys;
+        for (std::size_t i = 0; i < organ.size(); ++i) {
+            out.organ.add(organ[i].second);
+            greys.push_back(organ[i].second);
+            if (i >= organ.size() * 4 / 5) out.far.add(organ[i].second);
+        }
+        const auto middle = greys.begin() + static_cast<std::ptrdiff_t>(greys.size() / 2);
+        std::nth_element(greys.begin(), middle, greys.end());
+        out.median = *middle;
+        return out;
+    }
+    // What the organ of interest is made of: muscle alone, or fat and muscle in layers.
+    bool organ_is_muscle() const { return made_of("muscle") && !made_of(nullptr); }
+    bool organ_is_layered() const { return made_of("muscle") || made_of("fat"); }
     // The console after its Auto was pressed in this picture.
     runtime::ImageSettings after_auto(runtime::ImageSettings settings = {}) const {
         runtime::adjust_gain(pixels_, kSize, renderer_->layout(), exercise_.probe.depth_mm,
@@ -220,6 +297,15 @@ class Picture {
     }
 
   private:
+    // Whether a label of the organ is of that tissue; null: of another than muscle.
+    bool made_of(const char* tissue) const {
+        for (std::size_t l = 0; l < organ_.size(); ++l) {
+            if (!organ_[l]) continue;
+            const std::string& name = bundle_.labels[l].tissue;
+            if (tissue != nullptr ? name == tissue : name != "muscle") return true;
+        }
+        return false;
+    }
     double pixel(int x, int y) const { return pixels_[static_cast<std::size_t>(y * kSize + x)]; }
     int label_index(const std::string& name) const {
         for (std::size_t l = 0; l < bundle_.labels.size(); ++l)
@@ -233,6 +319,13 @@ class Picture {
             if (anatomy_.label(renderer_->at_rest(pose_ * (in_plane + by))) != label) return false;
         }
         return true;
+    }
+    bool in_target(Point3 rest) const {
+        for (const Target& lesion : shown_lesions(exercise_))
+            if (lesion.look != TargetLook::none &&
+                distance(rest, lesion.centre) < outer_radius_mm(lesion) + 2)
+                return true;
+        return false;
     }
     bool soft(int label) const {
         return label > 0 && tissue_of_[static_cast<std::size_t>(label)] >= 0 &&
@@ -297,6 +390,7 @@ class Picture {
     runtime::Skin skin_;
     CaseAnatomy anatomy_;
     std::vector<int> tissue_of_;
+    std::vector<bool> organ_;
     std::unique_ptr<Renderer> renderer_;
     std::vector<std::uint8_t> pixels_;
     Rigid pose_;
@@ -315,6 +409,56 @@ std::string machine_for(const Exercise& exercise) {
     return exercise.probe.shape == ProbeShape::linear ? "modern-linear" : "modern";
 }
 
+// How a picture opens in each plane that a trainee is shown or shows: the start, and the planes of
+// the exercise's own script. The organ of interest (formats/exercise/organ_of_interest.h) has a
+// middling grey, 80 to 110: its median, since bright septa, a capsule or the sinus of a kidney say
+// nothing about gain. What cannot be held to it:
+//   - An organ that fills less than a fifth of the picture's middle sets no gain, unless the
+//     script's needle lies in it. At the start Auto is asked as well.
+//   - Round a vessel lie fat and muscle, which differ by nature, with bright fasciae between them:
+//     no middle stands for both. There the mean, which fasciae raise, is at least 80, and the
+//     median, which they do not raise, at most 110.
+//   - Muscle alone is 8 dB darker than liver before its fibres are counted: were the psoas at 80,
+//     fat and wall before it would be white. There all tissue is at 80 to 110, and muscle above 50.
+constexpr double kDark = 80, kBright = 110, kDarkMuscle = 50, kSetsGain = 0.2;
+constexpr double kBrightNear = 165, kMostWhite = 1.0 / 6;  // fasciae are white in living pictures
+constexpr double kReadable = 35;                           // black is 3 to 9, blood 15 to 25
+
+void expect_opens_well(const CaseBundle& bundle, const EmbeddedExercise& embedded, bool judge) {
+    auto exercise = parse_exercise(embedded.toml, embedded.name);
+    ASSERT_TRUE(exercise) << exercise.error().message();
+    const char* out = std::getenv("SONOCASE_LEVELS_OUT");
+    Picture picture(bundle, *exercise, machine_for(*exercise));
+    for (const auto& [plane, pose] : picture.planes()) {
+        picture.draw(pose);
+        const std::string name = bundle.manifest.case_name + "-" + embedded.name + "-" + plane;
+        if (out != nullptr) picture.save(std::string(out) + "/" + name + ".pgm");
+        const auto l = picture.levels();
+        const double auto_db = picture.after_auto().gain_db;
+        std::printf(
+            "%-48s organ %3.0f, median %3.0f, %2.0f %%; tissue %3.0f; Auto %2.0f; near %3.0f, "
+            "white %2.0f %%; far %3.0f\n",
+            name.c_str(), l.organ.n > 0 ? l.organ.mean() : 0, l.median, 100 * l.share,
+            l.tissue.mean(), auto_db, l.near.mean(), 100 * l.white, l.far.n > 0 ? l.far.mean() : 0);
+        if (!judge) continue;
+        if (plane == "start") {
+            EXPECT_LE(std::abs(auto_db), kMaxAutoDb) << name;
+        }
+        EXPECT_LE(l.near.mean(), kBrightNear) << name;
+        EXPECT_LE(l.white, kMostWhite) << name;
+        if (l.share < kSetsGain && plane != "needle") continue;
+        EXPECT_GE(l.far.mean(), kReadable) << name;
+        if (picture.organ_is_muscle()) {
+            EXPECT_GE(l.median, kDarkMuscle) << name;
+            EXPECT_GE(l.tissue.mean(), kDark) << name;
+            EXPECT_LE(l.tissue.mean(), kBright) << name;
+        } else {
+            EXPECT_GE(picture.organ_is_layered() ? l.organ.mean() : l.median, kDark) << name;
+            EXPECT_LE(l.median, kBright) << name;
+        }
+    }
+}
+
 void measure(const std::string& path, bool judge) {
     auto loaded = load_bundle(path);
     ASSERT_TRUE(loaded) << loaded.error().message();
@@ -323,10 +467,10 @@ void measure(const std::string& path, bool judge) {
     std::printf("%-14s %-24s %-14s %7s %5s  %6s %6s %6s %6s\n", bundle.manifest.case_name.c_str(),
                 "exercise", "machine", "tissue", "Auto", "target", "around", "CNR", "shadow");
     for (const EmbeddedExercise& embedded : bundle.exercises) {
+        expect_opens_well(bundle, embedded, judge);
         auto exercise = parse_exercise(embedded.toml, embedded.name);
         ASSERT_TRUE(exercise) << exercise.error().message();
         const bool linear = exercise->probe.shape == ProbeShape::linear;
-        const std::string own = machine_for(*exercise);
         // Model paper draws no lesion of an exercise, and `modern` is a fan.
         for (const std::string machine : {"modern", "modern-linear", "classic", "paper"}) {
             const bool of_probe = machine != "paper" && !(machine == "modern" && linear);
@@ -349,9 +493,6 @@ void measure(const std::string& path, bool judge) {
                 }
             }
             std::printf("\n");
-            if (judge && machine == own) {
-                EXPECT_LE(std::abs(auto_db), kMaxAutoDb) << name;
-            }
         }
     }
 }
@@ -375,24 +516,16 @@ TEST(PictureLevels, OfTheRealTorso) {
             true);
 }
 
-void expect_opens_as_auto_would(const CaseBundle& bundle, const EmbeddedExercise& embedded) {
-    auto exercise = parse_exercise(embedded.toml, embedded.name);
-    ASSERT_TRUE(exercise) << exercise.error().message();
-    Picture picture(bundle, *exercise, machine_for(*exercise));
-    picture.draw(picture.start());
-    EXPECT_LE(std::abs(picture.after_auto().gain_db), kMaxAutoDb)
-        << bundle.manifest.case_name << ", " << embedded.name;
-}
-
-void expect_all_open_as_auto_would(const std::string& path) {
+void expect_all_open_well(const std::string& path) {
     auto bundle = load_bundle(path);
     ASSERT_TRUE(bundle) << bundle.error().message();
     for (const EmbeddedExercise& embedded : bundle->exercises)
-        expect_opens_as_auto_would(*bundle, embedded);
+        expect_opens_well(*bundle, embedded, true);
 }
 
 // Auto knows what a decibel does to the grey of its machine: pressed again, it asks for 1 dB at
-// most. Below 30 and beyond the knee grey does not follow the law; whole decibels are rounded.
+// most. Below 30 and beyond the knee grey does not follow the law; whole decibels are rounded. 9 dB
+// off, half of a picture lies beyond the knee: there it may ask for 2.
 TEST(PictureLevels, AutoPressedTwiceAsksForNothingMore) {
     auto bundle = load_bundle(testing::cooked_case("--preset draft").path);
     ASSERT_TRUE(bundle) << bundle.error().message();
@@ -409,7 +542,7 @@ TEST(PictureLevels, AutoPressedTwiceAsksForNothingMore) {
             const double more_db = picture.after_auto(once).gain_db - once.gain_db;
             std::printf("%-14s %5.0f dB off: %3.0f, then %2.0f dB\n", machine.c_str(), off_db,
                         once.gain_db - off_db, more_db);
-            EXPECT_LE(std::abs(more_db), 1) << machine << " " << off_db;
+            EXPECT_LE(std::abs(more_db), off_db > 0 ? 2 : 1) << machine << " " << off_db;
         }
     }
 }
@@ -417,22 +550,21 @@ TEST(PictureLevels, AutoPressedTwiceAsksForNothingMore) {
 // Its abscess is 28 mm of fluid: what lies behind it must not be taken for tissue that a depth gain
 // has to lift, nor the start, in another plane, open burnt out (it asked for -7 dB).
 TEST(PictureLevels, OfTheProcedures) {
-    expect_all_open_as_auto_would(
+    expect_all_open_well(
         testing::cooked_case(SONOCASE_SOURCE "/scenarios/procedures --preset draft").path);
 }
 
 TEST(PictureLevels, OfEveryOtherScenario) {
     for (const char* analytic : {"neck", "flow-phantom"})
-        expect_all_open_as_auto_would(testing::cooked_case(SONOCASE_SOURCE "/scenarios/" +
-                                                           std::string(analytic) +
-                                                           " --preset draft")
-                                          .path);
+        expect_all_open_well(testing::cooked_case(SONOCASE_SOURCE "/scenarios/" +
+                                                  std::string(analytic) + " --preset draft")
+                                 .path);
     const std::string data = SONOCASE_DATA;
     if (!fs::exists(data + "/ct/labels.nii.gz")) GTEST_SKIP() << "no " << data;
     for (const char* scanned : {"pressing", "vessels", "lesion-gallery"})
-        expect_all_open_as_auto_would(testing::cooked_scenario(std::string(scanned) + "/case.toml",
-                                                               "--set resample.voxel_mm=2")
-                                          .path);
+        expect_all_open_well(testing::cooked_scenario(std::string(scanned) + "/case.toml",
+                                                      "--set resample.voxel_mm=2")
+                                 .path);
 }
 
 // From below the woman's ribs, up through the liver: a curve without gaps closes the picture, and
@@ -447,7 +579,7 @@ TEST(PictureLevels, OfTheWomanWhoseDiaphragmClosesThePicture) {
     ASSERT_TRUE(bundle) << bundle.error().message();
     int domes = 0;
     for (const EmbeddedExercise& embedded : bundle->exercises) {
-        expect_opens_as_auto_would(*bundle, embedded);
+        expect_opens_well(*bundle, embedded, true);
         if (embedded.name != "diaphragm") continue;
         auto exercise = parse_exercise(embedded.toml, embedded.name);
         ASSERT_TRUE(exercise) << exercise.error().message();

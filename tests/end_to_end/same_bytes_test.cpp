@@ -25,16 +25,16 @@ namespace fs = std::filesystem;
 using sonocase::testing::read_text;
 using sonocase::testing::run_command;
 
-// Bundles: since their fit reports the readings that lie off the skin. Physical frames: since the
-// sheets of the wall meet, part and end. Paper frames: of these bundles and of scripts that keep
-// clear of ribs.
-constexpr const char* kDraft = "105efb26f2865cd9b2746e3d6824abec";
-constexpr const char* kBalanced = "7dc885eb6cb26bf622cb417e7c22b6e9";
-constexpr const char* kSlender = "324ddbf1be953e25fc645cf17a308409";
-constexpr const char* kReal = "173a85e6e19dc11c0cca474f67f96ceb";
-constexpr const char* kDraftPhysical = "7e2870d8a292dd78618601a01822b613";
+// Bundles: since their fit says whether the sweep moved. Physical frames: since the
+// opening gain goes by the exercise's organ. Paper frames: of these bundles and of scripts that
+// keep clear of ribs.
+constexpr const char* kDraft = "093036b035d0862c4a335bc86fc074bb";
+constexpr const char* kBalanced = "2a8c71d4b9b094fff9a9ed5a610e1d3f";
+constexpr const char* kSlender = "8c995d66974a587acdb74e987eeeda9d";
+constexpr const char* kReal = "a4cdadb38fa5710382993a03d7c14317";
+constexpr const char* kDraftPhysical = "acca27b34d2f1d055af23bcc21d9e73e";
 constexpr const char* kDraftPaper = "1aaccd9bf66881ec2231c9c0ceb219e6";
-constexpr const char* kRealPhysical = "1432b96edb28e246019cec7bb53276d7";
+constexpr const char* kRealPhysical = "a93b9816dc9e5cb9a036596e130601f0";
 constexpr const char* kRealPaper = "171f0dd55595047b8aebbc8803a1aecb";
 
 class SameBytes : public ::testing::Test {

@@ -304,7 +304,7 @@ Result<Surface> import_surface(const std::string& path,
                        ending == ".pts" || ending == ".asc" || ending == ".tsv" ||
                        ending == ".fcsv" || is_markups_file(path);
     if (!mesh && !cloud) {
-        if (auto foreign = foreign_format(path)) return *std::move(foreign);
+        if (auto foreign = foreign_format(path, Wanted::surface)) return *std::move(foreign);
         return Error{
             "not a known surface file name", path,
             "expected .ply, .stl, .obj, .vtp, .vtk, .glb, .csv, .tsv, .txt, .xyz, .fcsv or "

@@ -81,7 +81,7 @@ Result<NativeVolume> read_native(const std::string& path, const VolumeReading& r
     SONOCASE_TRY_DONE(check_source_file(path, "expected a volume file"));
     if (is_dicom_file(path)) return read_dicom(path, reading.resample_shear);
     if (!is_volume_file_name(path)) {
-        if (auto foreign = foreign_format(path)) return *std::move(foreign);
+        if (auto foreign = foreign_format(path, Wanted::volume)) return *std::move(foreign);
         return Error{
             "not a known volume file name", path,
             "expected .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, a DICOM segmentation, a folder of "

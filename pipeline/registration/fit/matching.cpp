@@ -99,6 +99,8 @@ Matches find_matches(const SkinModel& skin,
         bool ok = false;
     };
     const double farthest2 = options.farthest_mm * options.farthest_mm;
+    // Farther points are not searched for; on the bound the exact distance decides.
+    const double within2 = farthest2 * (1 + 1e-9);
     Matches matches;
     matches.target_queries = readings.size();
     std::vector<Found> found(readings.size());
@@ -106,7 +108,9 @@ Matches find_matches(const SkinModel& skin,
         for (std::size_t n = begin; n < end; ++n) {
             const std::uint32_t j = readings[n];
             double d2 = 0;
-            const std::uint32_t i = mapped_index.nearest(target.points[j], &d2);
+            const std::uint32_t i =
+                mapped_index.nearest_within(target.points[j], within2, PointIndex::kNone, &d2);
+            if (i == PointIndex::kNone) continue;
             if (d2 > farthest2 || skin.on_rim[i]) continue;
             if (dot(mapped_normals[i], target.normals[j]) < options.min_cosine) continue;
             found[n] = {match_of(i, mapped[i], mapped_normals[i], target, j), true};
@@ -125,7 +129,9 @@ Matches find_matches(const SkinModel& skin,
             const std::size_t i = n * skin_stride;
             if (skin.on_rim[i]) continue;
             double d2 = 0;
-            const std::uint32_t j = target.index.nearest(mapped[i], &d2);
+            const std::uint32_t j =
+                target.index.nearest_within(mapped[i], within2, PointIndex::kNone, &d2);
+            if (j == PointIndex::kNone) continue;
             if (d2 > farthest2 || target.lifted[j]) continue;
             if (dot(mapped_normals[i], target.normals[j]) < options.min_cosine) continue;
             const double gap = dot(target.normals[j], mapped[i] - target.points[j]);

@@ -2,7 +2,9 @@
 
 #include "pipeline/registration/fit/point_index.h"
 
+#include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <nanoflann.hpp>
 
 namespace sonocase::pipeline::inline registration_fit {
@@ -20,8 +22,35 @@ struct Cloud {
     }
 };
 
-using Tree = nanoflann::
-    KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Cloud>, Cloud, 3, std::uint32_t>;
+// The squared distance, as nanoflann's own adaptor has it, without its loop over axes.
+struct SquaredDistance {
+    using ElementType = double;
+    using DistanceType = double;
+    const Cloud& cloud;
+    double evalMetric(const double* a, std::uint32_t b, std::size_t) const {
+        const Point3 p = cloud.points[b];
+        const double x = a[0] - p.x, y = a[1] - p.y, z = a[2] - p.z;
+        return x * x + y * y + z * z;
+    }
+    double accum_dist(double a, double b, int) const { return (a - b) * (a - b); }
+};
+
+// The nearest point below a bound.
+struct Nearest {
+    std::uint32_t index;
+    double d2;
+    bool addPoint(double distance2, std::uint32_t i) {
+        if (distance2 < d2) {
+            d2 = distance2;
+            index = i;
+        }
+        return true;
+    }
+    double worstDist() const { return d2; }
+    bool full() const { return true; }
+};
+
+using Tree = nanoflann::KDTreeSingleIndexAdaptor<SquaredDistance, Cloud, 3, std::uint32_t>;
 
 }  // namespace
 
@@ -44,13 +73,25 @@ bool PointIndex::empty() const {
 }
 
 std::uint32_t PointIndex::nearest(Point3 p, double* squared_distance) const {
+    return nearest_within(p, INFINITY, kNone, squared_distance);
+}
+
+std::uint32_t PointIndex::nearest_within(Point3 p,
+                                         double within2,
+                                         std::uint32_t guess,
+                                         double* squared_distance) const {
     assert(!empty());
     const double query[3] = {p.x, p.y, p.z};
-    std::uint32_t index = 0;
-    double d2 = 0;
-    impl_->tree.knnSearch(query, 1, &index, &d2);
-    if (squared_distance) *squared_distance = d2;
-    return index;
+    Nearest found{kNone, within2};
+    if (guess != kNone) {
+        // A little wider than the guess, so that the bound of a box, which is rounded, does not
+        // leave out a point as near.
+        const double d2 = impl_->tree.distance.evalMetric(query, guess, 3);
+        found.d2 = std::min(within2, d2 * (1 + 1e-9) + 1e-12);
+    }
+    impl_->tree.findNeighbors(found, query, {});
+    if (squared_distance) *squared_distance = found.index == kNone ? INFINITY : found.d2;
+    return found.index;
 }
 
 std::vector<std::uint32_t> PointIndex::nearest(Point3 p, int count) const {

@@ -61,21 +61,39 @@ double penalty(double gap, double scale) {
     return scale * scale * std::log1p(gap * gap / (scale * scale));
 }
 
+// The nearest point of each query at the pose before, or PointIndex::kNone.
+struct Guesses {
+    explicit Guesses(const Pair& pair)
+        : skin(pair.target_queries.size(), PointIndex::kNone),
+          target(pair.skin_queries.size(), PointIndex::kNone) {}
+    std::vector<std::uint32_t> skin, target;
+};
+
 // Calls row(from_target, p, n, gap) for every point with a counterpart, p on the moved skin,
 // and missing(from_target) for the others.
 template <class RowOf, class Missing>
 void for_rows(const Pair& pair,
               const Rigid& pose,
               double farthest_mm,
+              Guesses& guesses,
               const RowOf& row,
               const Missing& missing) {
     const TargetSurface& target = pair.target;
     const Rigid back = inverse(pose);
     const double farthest2 = farthest_mm * farthest_mm;
-    for (std::uint32_t j : pair.target_queries) {
+    // Farther points are not searched for; on the bound the exact distance decides.
+    const double within2 = farthest2 * (1 + 1e-9);
+    for (std::size_t q = 0; q < pair.target_queries.size(); ++q) {
         double d2 = 0;
+        const std::uint32_t j = pair.target_queries[q];
         const Point3 y = target.points[j];
-        const std::uint32_t i = pair.skin_index.nearest(back * y, &d2);
+        const std::uint32_t i =
+            pair.skin_index.nearest_within(back * y, within2, guesses.skin[q], &d2);
+        if (i == PointIndex::kNone) {
+            missing(true);
+            continue;
+        }
+        guesses.skin[q] = i;
         const Vector3 n = pose * pair.skin.normals[i];
         if (pair.skin.on_rim[i] || d2 > farthest2 || dot(n, target.normals[j]) < 0.3) {
             missing(true);
@@ -85,10 +103,16 @@ void for_rows(const Pair& pair,
         }
     }
     const double side = 1.2 * target.spacing_mm;
-    for (std::uint32_t i : pair.skin_queries) {
+    for (std::size_t q = 0; q < pair.skin_queries.size(); ++q) {
+        const std::uint32_t i = pair.skin_queries[q];
         const Point3 p = pose * pair.skin.points[i];
         double d2 = 0;
-        const std::uint32_t j = target.index.nearest(p, &d2);
+        const std::uint32_t j = target.index.nearest_within(p, within2, guesses.target[q], &d2);
+        if (j == PointIndex::kNone) {
+            missing(false);
+            continue;
+        }
+        guesses.target[q] = j;
         const Vector3 n = target.normals[j];
         const double gap = dot(n, p - target.points[j]);
         const double aside2 = d2 - gap * gap;
@@ -108,7 +132,8 @@ Rigid step(const Pair& pair,
            const PoseHints& hints,
            const Rigid& pose,
            double scale_mm,
-           double farthest_mm) {
+           double farthest_mm,
+           Guesses& guesses) {
     Eigen::Matrix<double, 6, 6> a = Eigen::Matrix<double, 6, 6>::Zero();
     Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
     // About the moved origin of the skin and in units of 100 mm, so that rotations and translations
@@ -118,7 +143,7 @@ Rigid step(const Pair& pair,
     const double target_share = 1 / static_cast<double>(pair.target_queries.size());
     const double skin_share = 1 / static_cast<double>(pair.skin_queries.size());
     for_rows(
-        pair, pose, farthest_mm,
+        pair, pose, farthest_mm, guesses,
         [&](bool from_target, Point3 p, Vector3 n, double gap) {
             const double w =
                 (from_target ? target_share : skin_share) / (1 + gap * gap / (scale_mm * scale_mm));
@@ -164,11 +189,14 @@ Rigid step(const Pair& pair,
     return {rotation, (centre + shift) - Point3{}};  // the skin's origin goes to centre + shift
 }
 
-RigidCandidate scored(const Pair& pair, const PoseHints& hints, const Rigid& pose) {
+RigidCandidate scored(const Pair& pair,
+                      const PoseHints& hints,
+                      const Rigid& pose,
+                      Guesses& guesses) {
     double cost[2] = {0, 0};
     int counterparts = 0;
     for_rows(
-        pair, pose, 60,
+        pair, pose, 60, guesses,
         [&](bool from_target, Point3, Vector3, double gap) {
             cost[from_target] += std::min(penalty(gap, kScoreScaleMm), 400.0);
             counterparts += from_target;
@@ -189,15 +217,16 @@ RigidCandidate descend(const Pair& pair,
                        int iterations,
                        double first_scale_mm,
                        double last_scale_mm) {
+    Guesses guesses(pair);
     for (int n = 0; n < iterations; ++n) {
         const double t = iterations > 1 ? static_cast<double>(n) / (iterations - 1) : 1;
         const double scale = first_scale_mm * std::pow(last_scale_mm / first_scale_mm, t);
-        const Rigid next = step(pair, hints, pose, scale, 6 * scale);
+        const Rigid next = step(pair, hints, pose, scale, 6 * scale, guesses);
         const bool at_rest = same_pose(next, pose, 1e-5, 1e-3);
         pose = next;
         if (at_rest && n > iterations / 2) break;
     }
-    return scored(pair, hints, pose);
+    return scored(pair, hints, pose, guesses);
 }
 
 // The readings' own axes, from the longest to the shortest, each towards its longer tail: starts

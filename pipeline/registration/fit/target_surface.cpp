@@ -226,6 +226,7 @@ std::vector<std::uint32_t> take_distinct_points(const Surface& surface,
     for (std::size_t n = 0; n < unique.size(); ++n) {
         position[unique[n]] = static_cast<std::uint32_t>(n);
         t.points.push_back(Point3{} + (surface.points[unique[n]] - t.origin));
+        t.given_as.push_back(unique[n]);
     }
     std::vector<std::uint32_t> number(surface.points.size(), UINT32_MAX);
     for (std::size_t i = 0; i < number.size(); ++i) {
@@ -256,13 +257,15 @@ void take_table_out(TargetSurface& t, std::vector<std::uint32_t>& number) {
     if (!table.found) return;
     t.table = {true, table.place, table.normal, table.readings};
     std::vector<std::uint32_t> moved(t.points.size(), UINT32_MAX);
-    std::vector<Point3> kept;
+    std::size_t kept = 0;
     for (std::size_t i = 0; i < t.points.size(); ++i) {
         if (table.on_table[i]) continue;
-        moved[i] = static_cast<std::uint32_t>(kept.size());
-        kept.push_back(t.points[i]);
+        moved[i] = static_cast<std::uint32_t>(kept);
+        t.points[kept] = t.points[i];
+        t.given_as[kept++] = t.given_as[i];
     }
-    t.points = std::move(kept);
+    t.points.resize(kept);
+    t.given_as.resize(kept);
     for (std::uint32_t& n : number) {
         if (n != UINT32_MAX) n = moved[n];
     }

@@ -35,6 +35,7 @@ struct TargetSurface {
     std::vector<Vector3> normals;      // outward, unit
     std::vector<std::uint8_t> on_rim;  // 1 where the surface ends; the counterpart may lie beyond
     std::vector<std::uint8_t> lifted;  // 1 for lift-offs, which the fit does not use
+    std::vector<std::uint32_t> given_as;  // # points, their numbers in the surface given
     std::vector<std::array<std::uint32_t, 3>> triangles;  // of a mesh
     PointIndex index;                                     // over all points
     double spacing_mm = 0;                                // median distance to the sixth neighbour

@@ -84,10 +84,10 @@ class PhysicalFormation final : public ImageFormation {
         machine.looks.count = share(machine.looks.count);
         machine.looks.near_count = share(machine.looks.near_count);
         level.tables = physical::make_tables(exercise_.probe, machine, geometry);
-        const physical::OpeningGain opening =
-            physical::opening_gain(scene_, exercise_, level.tables, geometry);
+        if (!opening_)  // of the first, for all: they differ in beams and samples alone
+            opening_ = physical::opening_gain(scene_, exercise_, level.tables, geometry);
         for (physical::Row& row : level.tables.rows)
-            row.unit_db += opening.at(row.r_mm / geometry.depth_mm);
+            row.unit_db += opening_->at(row.r_mm / geometry.depth_mm);
         if (reference_) return;
         level.fast = std::make_unique<PhysicalFast>(scene_, geometry, level.tables, noise_,
                                                     press::press_face(exercise_.probe), context_);
@@ -253,6 +253,7 @@ class PhysicalFormation final : public ImageFormation {
     const RenderContext context_;
     const Machine machine_;
     std::vector<std::unique_ptr<Level>> levels_;
+    std::optional<physical::OpeningGain> opening_;
     mutable std::vector<TargetBall> balls_;  // of the present frame
     mutable std::array<NeedleShape, kMaxNeedles> needles_;
     std::optional<ReadAhead> ahead_;  // ends before the levels that it refers to

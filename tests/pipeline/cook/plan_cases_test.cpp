@@ -34,7 +34,7 @@ std::set<std::string> changed(const std::string& extra,
     RecipeOverrides overrides;
     overrides.sets = std::move(sets);
     const auto before =
-        keys(*parse_recipe(kRecipe, "r.toml", {}, &none), {"L", "", "S", "", "", {}});
+        keys(*parse_recipe(kRecipe, "r.toml", {}, &none), {"L", "", "S", "", "", {}, ""});
     const auto recipe = parse_recipe(kRecipe + extra, "r.toml", overrides, &none);
     EXPECT_TRUE(recipe.has_value()) << recipe.error().message();
     std::set<std::string> names;
@@ -44,16 +44,16 @@ std::set<std::string> changed(const std::string& extra,
 }
 
 using Names = std::set<std::string>;
-const InputDigests kInputs{"L", "", "S", "", "", {}};
+const InputDigests kInputs{"L", "", "S", "", "", {}, ""};
 
 TEST(PlanStages, ChangeReachesItsStageAndAllThatFollow) {
     EXPECT_EQ(changed("", kInputs), Names{});
     EXPECT_EQ(
-        changed("", {"other", "", "S", "", "", {}}),
+        changed("", {"other", "", "S", "", "", {}, ""}),
         (Names{"import", "surface", "warp", "resample", "texture", "structure", "flow", "pack"}));
-    EXPECT_EQ(changed("", {"L", "", "other", "", "", {}}),
+    EXPECT_EQ(changed("", {"L", "", "other", "", "", {}, ""}),
               (Names{"warp", "resample", "texture", "structure", "flow", "pack"}));
-    EXPECT_EQ(changed("", {"L", "", "S", "other", "", {}}), (Names{"texture", "pack"}));
+    EXPECT_EQ(changed("", {"L", "", "S", "other", "", {}, ""}), (Names{"texture", "pack"}));
     EXPECT_EQ(changed("", kInputs, {"structure.kidney=false"}), (Names{"structure", "pack"}));
     EXPECT_EQ(changed("", kInputs, {"smooth.method=joint"}),
               (Names{"smooth", "texture", "structure", "flow", "pack"}));

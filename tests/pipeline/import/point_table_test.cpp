@@ -99,6 +99,8 @@ TEST(PointTable, ReadsNamelessColumnsThatCanMeanOneThing) {
           {"decimal commas", with_commas(rows("", "", " "))},
           {"normals", rows("", " 0 0.6 0.8", " ")},
           {"colours", rows("", ",255,0,12", ",")},
+          {"PTS", "10\n" + rows("", " -1017", " ")},
+          {"PTS with colours", "10\n" + rows("", " -1017 10 20 30", " ")},
           {"name", rows("p%n,", "", ",")}})
         expect_places(parse_point_table(text, "a"), what);
     const auto normals = parse_point_table(rows("", " 0 0.6 0.8", " "), "a");
@@ -116,15 +118,18 @@ TEST(PointTable, AsksWhichColumnsAreMeantAndItsAdviceWorks) {
     const struct {
         const char* what;
         std::string text, line;
-    } cases[] = {{"a value behind", rows("", ",5.5", ","), "x,y,z,c4"},
-                 {"a number before", rows("%n,", "", ","), "n,x,y,z"},
-                 {"time before", rows("0.%n ", "", " "), "time,x,y,z"},
-                 {"TUM", rows("0.%n ", " 0 0 0 1", " "), "time,x,y,z,qx,qy,qz,qw"},
-                 {"position and turn", rows("", ",0.1,0.2,0.3,0.9", ","), "x,y,z,qx,qy,qz,qw"},
-                 {"turn and position", rows("1;0;0;0;", "", ";"), "qw,qx,qy,qz,x,y,z"},
-                 {"PTS", "10\n" + rows("", " 7 10 20 30", " "), "x,y,z,qx,qy,qz,qw"},
-                 {"five", rows("%n,0.5,", "", ","), "n,time,x,y,z"},
-                 {"angles", rows("", ",0.1,-0.2,12.5", ","), "x,y,z,c4,c5,c6"}};
+    } cases[] = {
+        {"a value behind", rows("", ",5.5", ","), "x,y,z,c4"},
+        {"a number before", rows("%n,", "", ","), "n,x,y,z"},
+        {"time before", rows("0.%n ", "", " "), "time,x,y,z"},
+        {"TUM", rows("0.%n ", " 0 0 0 1", " "), "time,x,y,z,qx,qy,qz,qw"},
+        {"position and turn", rows("", ",0.1,0.2,0.3,0.9", ","), "x,y,z,qx,qy,qz,qw"},
+        {"turn and position", rows("1;0;0;0;", "", ";"), "qw,qx,qy,qz,x,y,z"},
+        {"intensity, colours, no count", rows("", " 7 10 20 30", " "), "x,y,z,qx,qy,qz,qw"},
+        {"count, turns", "10\n" + rows("", " 0.1 0.2 0.3 0.9", " "), "x,y,z,qx,qy,qz,qw"},
+        {"count, times", "10\n" + rows("0.%n ", "", " "), "time,x,y,z"},
+        {"five", rows("%n,0.5,", "", ","), "n,time,x,y,z"},
+        {"angles", rows("", ",0.1,-0.2,12.5", ","), "x,y,z,c4,c5,c6"}};
     for (const auto& c : cases) {
         const std::string said = refusal(c.text);
         EXPECT_NE(said.find("which columns are x, y and z?"), std::string::npos) << c.what << said;

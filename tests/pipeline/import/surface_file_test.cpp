@@ -510,6 +510,8 @@ TEST(ImportSurfaceRefuses, WithAdviceThatWorks) {
         {"a.csv", "1 of ", "delete their rows", cloud + "1000000,0,0\n", cloud},
         {"a.off", "an OFF surface", ".stl", "OFF\n", obj},
         {"a.gltf", "lie in several files", "one .glb", "{}", obj},
+        {"a.npy", "an array of NumPy", "CSV below a line 'x,y,z'", "\x93NUMPY", cloud},
+        {"a.tif", "a TIFF picture", "points as CSV", "II*", cloud},
         {"a.obj", "a comma among its numbers: v 10,0", "decimal points",
          replaced(obj, "v 10 ", "v 10,0 "), obj},
     };
@@ -520,7 +522,9 @@ TEST(ImportSurfaceRefuses, WithAdviceThatWorks) {
         EXPECT_NE(message.find(c.what), std::string::npos) << message;
         EXPECT_NE(refused.error().expected.find(c.advice), std::string::npos) << message;
         EXPECT_EQ(message.find("vtkX"), std::string::npos) << message;
-        const std::string mended = std::string(c.name).ends_with("f") ? "mended.obj" : c.name;
+        const std::string mended = c.mended == obj     ? "mended.obj"
+                                   : c.mended == cloud ? "a.csv"
+                                                       : c.name;
         const auto read = import_surface(folder.write(mended, c.mended), c.options);
         if (mended == "a.csv")
             EXPECT_TRUE(read) << c.what;

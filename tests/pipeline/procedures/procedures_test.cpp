@@ -313,9 +313,10 @@ TEST(Procedures, WhoLooksAwayWhileAPictureIsAskedForFailsThatItemAlone) {
             // After a step that was never performed nobody is asked about it.
             const StepState state = result.steps[static_cast<std::size_t>(s)].state;
             const bool never = state == StepState::missed || state == StepState::waiting;
-            for (const ProcedureItem& item : exercise.procedure.items)
-                if (never && item.rule == ItemRule::asked && item.from_step == s)
-                    EXPECT_EQ(std::erase(lost, item.name + " not_answered"), 1u) << joined(lost);
+            for (const ProcedureItem& item : exercise.procedure.items) {
+                if (!never || item.rule != ItemRule::asked || item.from_step != s) continue;
+                EXPECT_EQ(std::erase(lost, item.name + " not_answered"), 1u) << joined(lost);
+            }
             for (std::size_t other = 0; other < exercise.procedure.steps.size(); ++other)
                 if (waits_for(exercise, other, s))
                     std::erase(lost, item_of(exercise, static_cast<int>(other)) + " not_done");

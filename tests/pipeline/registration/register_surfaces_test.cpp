@@ -223,5 +223,62 @@ TEST(FoldProof, NeverLiesAboveDenseSamples) {
     }
 }
 
+// Nearest neighbours below a bound and from a guess, beside a comparison with all points.
+std::vector<Point3> cloud(std::size_t count, Random& random) {
+    std::vector<Point3> points;
+    for (std::size_t i = 0; i < count; ++i)
+        points.push_back(
+            {random.uniform(-200, 200), random.uniform(-100, 100), random.uniform(-300, 300)});
+    return points;
+}
+
+std::uint32_t nearest_of_all(const std::vector<Point3>& points, Point3 p) {
+    std::uint32_t best = 0;
+    for (std::uint32_t i = 1; i < points.size(); ++i)
+        if (distance(points[i], p) < distance(points[best], p)) best = i;
+    return best;
+}
+
+TEST(PointIndex, AGuessChangesTheCostAlone) {
+    Random random(3);
+    const std::vector<Point3> points = cloud(800, random);
+    const PointIndex index(points);
+    for (const Point3 p : cloud(500, random)) {
+        const std::uint32_t nearest = nearest_of_all(points, p);
+        EXPECT_EQ(index.nearest(p), nearest);
+        for (const std::uint32_t guess : {nearest, 0u, 399u, PointIndex::kNone}) {
+            double d2 = 0;
+            EXPECT_EQ(index.nearest_within(p, INFINITY, guess, &d2), nearest);
+            EXPECT_NEAR(std::sqrt(d2), distance(points[nearest], p), 1e-9);
+        }
+    }
+}
+
+TEST(PointIndex, WhatLiesBeyondTheBoundIsNotFound) {
+    Random random(4);
+    const std::vector<Point3> points = cloud(800, random);
+    const PointIndex index(points);
+    int within = 0;
+    for (const Point3 p : cloud(500, random)) {
+        const std::uint32_t nearest = nearest_of_all(points, p);
+        const bool near = distance(points[nearest], p) < 25;
+        within += near;
+        for (const std::uint32_t guess : {nearest, 7u, PointIndex::kNone})
+            EXPECT_EQ(index.nearest_within(p, 25 * 25, guess), near ? nearest : PointIndex::kNone);
+    }
+    EXPECT_GT(within, 50);  // both kinds are there
+    EXPECT_LT(within, 450);
+}
+
+// Of points that are equally near any may be taken; of equal points one is.
+TEST(PointIndex, EqualPointsAreFound) {
+    const std::vector<Point3> points(40, {1, 2, 3});
+    const PointIndex index(points);
+    double d2 = 1;
+    EXPECT_LT(index.nearest_within({1, 2, 3}, 1, 5, &d2), 40u);
+    EXPECT_EQ(d2, 0);
+    EXPECT_EQ(index.nearest_within({1, 2, 9}, 1, PointIndex::kNone), PointIndex::kNone);
+}
+
 }  // namespace
 }  // namespace sonocase::pipeline

@@ -156,7 +156,7 @@ TEST(SessionRun, KeepsThePictureOfEachInsertionsDeepestPoint) {
 // A cyst to be drained: numbed outside it, emptied, and the needle rests in it.
 Exercise draining() {
     Exercise exercise = testing::small_exercise();
-    exercise.targets[0] = {"cyst", {25, 0, 35}, 8, 8, TargetLook::cyst};
+    exercise.targets[0] = {"cyst", {25, 0, 35}, 8, 8, TargetLook::cyst, "", {}, ""};
     Procedure& p = exercise.procedure;
     ProcedureStep numb, rest, empty;
     numb.name = "numb";
