@@ -233,6 +233,22 @@ TEST(CheckedCases, HaveNoFaultsAndTenPlantedOnesAreNamed) {
     }
 }
 
+// The skin of a man does not tell his right side from his left. Whoever builds the case reads it,
+// and whoever checks the bundle later.
+TEST(CheckedCases, WhatTheSkinDoesNotTellIsSaidByBuildAndByCheck) {
+    const CaseBundle* bundle = cooked(kBodies[1]);
+    if (bundle == nullptr) GTEST_SKIP() << "no " << SONOCASE_DATA;
+    const std::string open = "not verified: the skin does not tell right from left, ";
+    const std::string said =
+        cooked_scenario(kBodies[1].scenario, "--preset draft " + std::string(kBodies[1].settings))
+            .error;
+    EXPECT_NE(said.find("warning: " + open), std::string::npos) << said;
+    const std::vector<std::string> remarks = check_case(*bundle).remarks;
+    EXPECT_EQ(std::count_if(remarks.begin(), remarks.end(),
+                            [&](const std::string& r) { return r.starts_with("align: " + open); }),
+              1);
+}
+
 // Liver, spleen and kidney, 20 seeds: half a voxel of 8 mm3 is .2 % of 2 ml.
 TEST(CheckedCases, LesionsHaveTheVolumeAskedForInEveryBody) {
     testing::HardCase off("volume of a lesion of 2 ml, off", testing::HardCase::at_most, 0.0021,
