@@ -15,7 +15,7 @@
 namespace sonocase::pipeline::inline registration_fit {
 namespace {
 
-constexpr std::size_t kMostPoints = 4000, kLeastPart = 60, kLeastPairs = 40;
+constexpr std::size_t kMaxPoints = 4000, kMinPart = 60, kMinPairs = 40;
 constexpr int kPlaces = 7;       // in the order, at which a motion is looked for
 constexpr int kNeighbours = 10;  // that define the plane through a reading
 constexpr int kCompared = 6;     // neighbours that a reading is compared with to find the place
@@ -24,12 +24,12 @@ constexpr double kFirstLossMm = 8, kLastLossMm = 3;  // Cauchy scale
 constexpr int kRounds = 5;                           // of matching
 // Expected beforehand, standard deviations; they keep at rest what a narrow border leaves open.
 constexpr double kUsualShiftMm = 20, kUsualTurnRad = 0.1, kUsualGapMm = 2;
-constexpr double kLeastMotionMm = 2, kLeastClosedMm = 0.6;
+constexpr double kMinMotionMm = 2, kMinClosedMm = 0.6;
 // Mean squared gap before over after: of readings all over a body at rest at most 1.11, and 1.8 of
 // some 60 along a border. What no mannequin at rest reaches (43) is the logarithm times the pairs;
 // motions of 5 mm or 2 degrees that were read all over have 170 and more.
-constexpr double kLeastGain = 1.15;
-constexpr double kLeastEvidence = 60;
+constexpr double kMinGain = 1.15;
+constexpr double kMinEvidence = 60;
 
 // The readings of one part of the order, and the planes through their neighbours.
 struct Part {
@@ -165,7 +165,7 @@ struct Tried {
     double gain() const { return gap2 / std::max(closed2, 1e-6); }
     // Twice the logarithm of the ratio of likelihoods, if each pair told for itself.
     double evidence() const {
-        return pairs < kLeastPairs ? 0 : static_cast<double>(pairs) * std::log(gain());
+        return pairs < kMinPairs ? 0 : static_cast<double>(pairs) * std::log(gain());
     }
 };
 
@@ -232,16 +232,16 @@ std::size_t turning_point(std::span<const Point3> points, const Tried& t) {
 SweepMotion find_sweep_motion(const TargetSurface& target) {
     SweepMotion motion;
     if (!target.triangles.empty()) return motion;
-    const std::size_t stride = (target.points.size() + kMostPoints - 1) / kMostPoints;
+    const std::size_t stride = (target.points.size() + kMaxPoints - 1) / kMaxPoints;
     std::vector<Point3> points;
     for (std::size_t i = 0; i < target.points.size(); i += stride)
         points.push_back(target.points[i]);
-    if (points.size() < 2 * kLeastPart) return motion;
+    if (points.size() < 2 * kMinPart) return motion;
     std::vector<Tried> tried(kPlaces);
     parallel_for(tried.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t n = begin; n < end; ++n) {
             const std::size_t at = (n + 1) * points.size() / (kPlaces + 1);
-            if (std::min(at, points.size() - at) >= kLeastPart) tried[n] = tried_at(points, at);
+            if (std::min(at, points.size() - at) >= kMinPart) tried[n] = tried_at(points, at);
         }
     });
     Tried best = *std::max_element(tried.begin(), tried.end(), [](const Tried& a, const Tried& b) {
@@ -250,7 +250,7 @@ SweepMotion find_sweep_motion(const TargetSurface& target) {
     if (best.evidence() <= 0) return motion;
     for (int round = 0; round < 3; ++round) {
         const std::size_t at = turning_point(points, best);
-        if (at == best.first_after || std::min(at, points.size() - at) < kLeastPart) break;
+        if (at == best.first_after || std::min(at, points.size() - at) < kMinPart) break;
         const Tried nearer = tried_at(points, at);
         // Elsewhere there may be more pairs, of readings that lie on the wrong side of the motion.
         if (nearer.evidence() < 0.5 * best.evidence()) break;
@@ -262,7 +262,7 @@ SweepMotion find_sweep_motion(const TargetSurface& target) {
         middle = middle + (p - Point3{}) / static_cast<double>(later.size());
     motion.first_after = best.first_after * stride;
     motion.shift_mm = distance(best.back * (Point3{} + middle), Point3{} + middle);
-    motion.turn_deg = rotation_angle(best.back.rotation) / kRadPerDeg;
+    motion.turn_deg = rotation_angle(best.back.rotation) * kDegPerRad;
     motion.gap_mm = std::sqrt(best.gap2);
     motion.closed_gap_mm = std::sqrt(best.closed2);
     double moved2 = 0;
@@ -272,9 +272,9 @@ SweepMotion find_sweep_motion(const TargetSurface& target) {
     }
     motion.evidence = best.evidence();
     motion.overlap = static_cast<double>(best.pairs) / static_cast<double>(best.smaller_part);
-    motion.found = best.gain() > kLeastGain && motion.evidence > kLeastEvidence &&
-                   best.gap2 - best.closed2 > kLeastClosedMm * kLeastClosedMm &&
-                   std::sqrt(moved2) > kLeastMotionMm;
+    motion.found = best.gain() > kMinGain && motion.evidence > kMinEvidence &&
+                   best.gap2 - best.closed2 > kMinClosedMm * kMinClosedMm &&
+                   std::sqrt(moved2) > kMinMotionMm;
     return motion;
 }
 

@@ -69,6 +69,7 @@ struct GainLaw {
     // Range at which the exponent holds; at another one it is smaller in the same proportion as
     // that is wider. 0: the console's range does nothing.
     double range_db = 0;
+    double knee = 255, knee_slope = 1;  // of a power: above `knee`, grey grows by so much of that
 };
 
 // A straight needle as drawn: after calibration and bend constraint.

@@ -96,7 +96,8 @@ class PhysicalFormation final : public ImageFormation {
 
     GainLaw gain_law() const override {
         const MachineGrey& grey = machine_.grey;
-        return {grey.floor, grey.map == GreyMap::log ? 0 : grey.exponent, grey.dynamic_range_db};
+        return {grey.floor, grey.map == GreyMap::log ? 0 : grey.exponent, grey.dynamic_range_db,
+                grey.knee, grey.knee_slope};
     }
 
     FrameStatus render_fast(int level,
