@@ -35,18 +35,17 @@ double grey_after(double grey, double db, const GainLaw& law, double range_db) {
 }
 
 // The whole decibels after which the mean of a picture's echoes is nearest to what is wanted. Each
-// grey is followed by itself: the bright ones are bent by the knee, and dim ones count no more
-// where they fall below what shows an echo.
+// grey is followed by itself, since the knee bends the bright ones; beyond the knee, where fasciae,
+// bone and gas lie, it counts as the knee.
 double gain_wanted(const std::array<double, 256>& count, const GainLaw& law, double range_db) {
     double best_db = 0, best = 1e9;
     for (int step = 0; step <= 120; ++step) {
         const double db = step % 2 == 0 ? step / 2 : -(step + 1) / 2;
         double sum = 0, n = 0;
         for (int level = kEcho; level < 256; ++level) {
-            const double after = grey_after(level, db, law, range_db);
-            if (count[static_cast<std::size_t>(level)] == 0 || after < kEcho) continue;
-            sum += after * count[static_cast<std::size_t>(level)];
-            n += count[static_cast<std::size_t>(level)];
+            const double times = count[static_cast<std::size_t>(level)];
+            if (times > 0) sum += times * std::min(grey_after(level, db, law, range_db), law.knee);
+            n += times;
         }
         if (n > 0 && std::abs(sum / n - kWanted) < best) {
             best = std::abs(sum / n - kWanted);
