@@ -567,6 +567,7 @@ void ProcedureRun::act(const Act& act, const Facts& f) {
             }
             state_.wire_mm = std::clamp(state_.wire_mm + act.amount, 0.0, kWireMm);
             state_.wire_in = state_.wire_mm > 0;
+            state_.wire_was_in = state_.wire_was_in || state_.wire_in;
             if (state_.wire_mm > kWireMm - kWireHeldMm)
                 happened(ComplicationKind::wire_lost, f.time_s);
             wire_.in = state_.wire_in;
@@ -790,6 +791,8 @@ void ProcedureRun::update(double time_s,
         }
     }
     if (f.probe_ok && anatomy_) f.on_skin = probe_on_skin(*anatomy_, probe_, f.probe);
+    state_.needle_was_in = state_.needle_was_in || f.depth_mm > 0;
+    state_.probe_was_on_skin = state_.probe_was_on_skin || f.on_skin;
     watch_needle(f);
     for (int i = 0; i < std::clamp(acts.count, 0, ActList::kMaxActs); ++i) {
         const Act& one = acts.acts[static_cast<std::size_t>(i)];
@@ -878,13 +881,26 @@ int ProcedureRun::present_step() const {
     return -1;
 }
 
+// Whether what the condition asks for could have come about in this session.
+bool ProcedureRun::tried(const Watch& w) const {
+    const Condition& c = w.condition;
+    if (w.step >= 0) return state_.steps[static_cast<std::size_t>(w.step)].performed;
+    if (c.act >= 0) return state_.needle_was_in || state_.probe_was_on_skin;
+    if (w.complication == static_cast<int>(ComplicationKind::wire_lost) || c.wire_in == 1)
+        return state_.wire_was_in;
+    if (!w.taken.empty) return state_.throws > 0;
+    const bool of_needle = w.complication >= 0 || w.aspirated >= 0 || !w.tip_in.empty ||
+                           c.needle_in == 1 || c.tip_in_view == 1 || c.depth_at_least_mm >= 0;
+    return of_needle ? state_.needle_was_in : state_.probe_was_on_skin;
+}
+
 bool ProcedureRun::item_ticked(int index) const {
     const ProcedureItem& item = exercise_->procedure.items[static_cast<std::size_t>(index)];
     const ProcedureState::Item& state = state_.items[static_cast<std::size_t>(index)];
     switch (item.rule) {
         case ItemRule::step: return state_.steps[static_cast<std::size_t>(item.step)].counts;
         case ItemRule::when: return state.held;
-        case ItemRule::never: return !state.held;
+        case ItemRule::never: return !state.held && tried(item_[static_cast<std::size_t>(index)]);
         case ItemRule::asked: {
             int right = item.answer;
             if (!item.finding.empty() &&
@@ -984,7 +1000,9 @@ ProcedureResult ProcedureRun::result() const {
                 row.why =
                     step.state == StepState::missed ? "not_done" : step_state_name(step.state);
         } else if (!row.ticked) {
-            row.why = item.rule == ItemRule::never  ? "happened"
+            const bool never = item.rule == ItemRule::never;
+            row.why = never && state.held           ? "happened"
+                      : never                       ? "not_tried"
                       : item.rule == ItemRule::when ? "not_done"
                       : state.held                  ? "wrong_answer"
                                                     : "not_answered";
@@ -1057,6 +1075,7 @@ const char* missed_words(std::string_view why) {
     return why == "too_early"      ? "Too early"
            : why == "too_late"     ? "Too late"
            : why == "happened"     ? "It happened"
+           : why == "not_tried"    ? "Not tried"
            : why == "wrong_answer" ? "Answered wrongly"
            : why == "not_answered" ? "Not answered"
                                    : "Not done";

@@ -113,6 +113,8 @@ struct ProcedureState {
     double wire_mm = 0;
     bool wire_in = false, catheter_in = false;
     int wire_label = 0;
+    // At any moment so far: what was not done cannot have gone well either.
+    bool needle_was_in = false, wire_was_in = false, probe_was_on_skin = false;
     double compressed_s = 0, bleeding_compressed_s = 0;
     bool compressing = false;
     double head_down_deg = 0;  // of the table
@@ -148,7 +150,7 @@ struct ProcedureResult {
         double weight = 1;
         double time_s = -1;  // of the moment that ticked it, or spoilt it; negative: none
         std::string why;     // where not ticked: not_done, too_early, too_late, happened,
-                             // wrong_answer, not_answered
+                             // not_tried, wrong_answer, not_answered
     };
     struct Happened {
         std::string name;
@@ -201,6 +203,8 @@ class ProcedureRun {
     // all are behind.
     int present_step() const;
     StepState step_state(int step) const;
+    // Of a `never`: also that what it guards against could have happened, since whoever inserts
+    // nothing spares nothing.
     bool item_ticked(int item) const;
     ProcedureView view() const;  // constant time for a given procedure; allocates nothing
     // Items and steps that changed in the last sample, as bits.
@@ -237,6 +241,7 @@ class ProcedureRun {
     Watch watch(const Condition& condition, const std::vector<Label>& labels) const;
     void look(const Facts& facts);
     bool in(const Regions& regions, const Facts& facts) const;
+    bool tried(const Watch& watch) const;
     bool shown(const Regions& regions, double at_least, const Facts& facts);
     bool holds(const Watch& watch, const Facts& facts);
     // Whether the condition is fulfilled now, with its act and its hold_s.

@@ -538,7 +538,7 @@ class App {
 function title_of(exercise) { return exercise.titles?.[language_in_use()] || exercise.title || exercise.name; }
 function item_title(exercise, item) { return exercise.items?.find((one) => one.name === item.name)?.title || item.title; }
 function missed_words(why) {
-    return {too_early: t('Too early'), too_late: t('Too late'), happened: t('It happened'), wrong_answer: t('Answered wrongly'),
+    return {too_early: t('Too early'), too_late: t('Too late'), happened: t('It happened'), not_tried: t('Not tried'), wrong_answer: t('Answered wrongly'),
         not_answered: t('Not answered')}[why] ?? t('Not done');
 }
 

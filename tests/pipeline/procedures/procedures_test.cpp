@@ -146,10 +146,19 @@ bool waits_for(const Exercise& exercise, std::size_t step, int s) {
 }
 
 // What went missing because of step s alone: steps over a wire cannot be done without one, and
-// their items go with that of the wire.
+// their items go with that of the wire. Without a wire none is kept, without a core nothing spared
+// by it.
 std::vector<std::string> missed_by(const Exercise& exercise, int s, const ProcedureResult& result) {
     std::vector<std::string> names = missed(result);
     const auto& steps = exercise.procedure.steps;
+    for (const ProcedureItem& item : exercise.procedure.items) {
+        const bool of_wire = item.condition.complication == "wire_lost" &&
+                             steps[s].done.act == static_cast<int>(ActKind::wire);
+        const bool of_core = !item.condition.taken.empty() &&
+                             steps[s].done.act == static_cast<int>(ActKind::core_throw);
+        if (item.rule == ItemRule::never && (of_wire || of_core))
+            std::erase(names, item.name + " not_tried");
+    }
     if (steps[s].done.act != static_cast<int>(ActKind::wire)) return names;
     for (std::size_t other = 0; other < steps.size(); ++other) {
         if (steps[other].done.wire_in != 1) continue;
@@ -320,10 +329,43 @@ TEST(Procedures, WhoLooksAwayWhileAPictureIsAskedForFailsThatItemAlone) {
             for (std::size_t other = 0; other < exercise.procedure.steps.size(); ++other)
                 if (waits_for(exercise, other, s))
                     std::erase(lost, item_of(exercise, static_cast<int>(other)) + " not_done");
+            // What must not follow this step cannot go well without it.
+            for (const ProcedureItem& item : exercise.procedure.items)
+                if (item.rule == ItemRule::never && item.condition.step == step.name)
+                    std::erase(lost, item.name + " not_tried");
             ASSERT_EQ(lost.size(), 1u) << name << ": " << joined(lost);
             EXPECT_EQ(lost[0].find(item_of(exercise, s)), 0u) << lost[0];
         }
     }
+}
+
+TEST(Procedures, WhoInsertsNothingSparesNothing) {
+    int judged = 0;
+    for (const std::string& name : procedures()) {
+        const Exercise exercise = procedure_called(name);
+        Session looks = play(exercise);
+        for (SessionSample& sample : looks.samples) {
+            sample.needle_ok = false;
+            sample.acts = {};
+        }
+        const ProcedureResult result = judge(looks, exercise);
+        for (std::size_t i = 0; i < result.items.size(); ++i) {
+            const ProcedureItem& item = exercise.procedure.items[i];
+            if (item.rule != ItemRule::never) continue;
+            // A turn of the patient or a firm press would have been possible without a needle.
+            const bool of_probe = item.condition.force_at_least_n >= 0;
+            const bool of_act = item.condition.act >= 0 && item.condition.step.empty();
+            const bool may_tick = of_probe || of_act;
+            EXPECT_EQ(result.items[i].ticked, may_tick) << name << " " << item.name;
+            EXPECT_EQ(result.items[i].why, may_tick ? "" : "not_tried") << name << " " << item.name;
+            ++judged;
+        }
+        // Nobody at all: not even the probe was there.
+        Session nobody = looks;
+        for (SessionSample& sample : nobody.samples) sample.probe_ok = sample.has_press = false;
+        EXPECT_EQ(judge(nobody, exercise).points, 0) << name;
+    }
+    EXPECT_GT(judged, 10);
 }
 
 TEST(Procedures, AThousandRandomSessionsNeitherCrashNorPass) {

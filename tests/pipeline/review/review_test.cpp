@@ -214,8 +214,8 @@ TEST(Review, EveryLanguageHasEveryWord) {
         std::replace(name.begin(), name.end(), '_', ' ');
         words.insert(name);
     }
-    for (const char* why :
-         {"too_early", "too_late", "happened", "wrong_answer", "not_answered", "not_done"})
+    for (const char* why : {"too_early", "too_late", "happened", "not_tried", "wrong_answer",
+                            "not_answered", "not_done"})
         words.insert(missed_words(why));
     words.insert({"not passed", "picture"});
     for (const MetricInfo& metric : metric_table()) words.insert(metric.title);

@@ -456,7 +456,7 @@ await run_tests({
         expect_equal(await text('checklist-words'), `Checklist: ${items.filter((one) => one.ticked).length} of ${items.length}, ${points} points of ${max_points}, ${cut} needed`, 'points');
         const clock = (s) => s === null ? '–' : `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, '0')}`;
         expect_equal(lines.join('|'), items.map((one) => one.title + clock(one.time_s) + (one.critical ? 'critical' : '') + (one.ticked ? '✓ done'
-            : `✗ ${{too_early: 'Too early', too_late: 'Too late', happened: 'It happened', wrong_answer: 'Answered wrongly', not_answered: 'Not answered'}[one.why] ?? 'Not done'}`)).join('|'), 'each line');
+            : `✗ ${{too_early: 'Too early', too_late: 'Too late', happened: 'It happened', not_tried: 'Not tried', wrong_answer: 'Answered wrongly', not_answered: 'Not answered'}[one.why] ?? 'Not done'}`)).join('|'), 'each line');
         // A scan says nothing of needles until one is taken.
         await page.open(`${its_url}?case=procedures&exercise=planes`);
         await page.until(`${kFrames} > 0 && sonoplay.app.scan.complete`);
