@@ -247,6 +247,7 @@ std::string step_title(const TaskCardInput& input) {
                            : tr("All steps are behind you: finish the attempt");
 }
 
+constexpr const char* kQuestionWaits = "A question waits";
 constexpr float kTabsHigh = 28, kTabsBelow = 6, kTitleBelow = 4;
 constexpr float kComplicationHigh = 22, kComplicationBelow = 2;
 
@@ -261,17 +262,34 @@ float done_high(const Ui& ui, float width, const TaskCardInput& input) {
     return sum;
 }
 
+// Whether a question was put off. It stands as the last tab of the steps where there are tabs,
+// which costs no room; elsewhere as a line of its own.
+bool question_waits(const TaskCardInput& input) {
+    return !input.replays && next_question(input.exercise.procedure, input.procedure->state) >= 0;
+}
+constexpr int kMaxTabs = 10;
+bool has_tabs(const TaskCardInput& input) {
+    const int count = static_cast<int>(input.texts.steps.size());
+    return (!input.exam || input.replays) && count > 0 && count <= kMaxTabs;
+}
+
 // The steps of a procedure: which are done, and what is to be done now.
-void draw_procedure_steps(Ui& ui, Box& room, const TaskCardInput& input) {
+void draw_procedure_steps(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
     const ProcedureView& view = *input.procedure;
     const int count = static_cast<int>(input.texts.steps.size());
     if (count == 0 || room.h < 30) return;
-    constexpr int kMaxTabs = 10;
-    if (count <= kMaxTabs) {
+    if (has_tabs(input)) {
+        const bool waits = question_waits(input);
+        const int columns = count + (waits ? 1 : 0);
         const Box tabs = room.take_top(kTabsHigh, kTabsBelow);
         for (int i = 0; i < count; ++i)
-            draw_step_tab(ui, tabs.column(i, count, 4), i + 1,
+            draw_step_tab(ui, tabs.column(i, columns, 4), i + 1,
                           view.steps[static_cast<std::size_t>(i)]);
+        ButtonStyle style;
+        style.link = true;
+        style.tip = kQuestionWaits;
+        if (waits && ui.button("ask", tabs.column(count, columns, 4), "?", style))
+            request.put_off = -1;
     } else {
         ui.text(room.take_top(20, 4),
                 filled(tr("Step %d of %d"), view.present_step < 0 ? count : view.present_step + 1,
@@ -295,7 +313,7 @@ constexpr float kAskHigh = 28;  // of the link to a question that was put off
 // words, what was done, the hint.
 float whole_standing(const Ui& ui, float width, const TaskCardInput& input, bool instructs) {
     float sum = done_high(ui, width, input);
-    if (next_question(input.exercise.procedure, input.procedure->state) >= 0) sum += kAskHigh + 4;
+    if (question_waits(input) && !has_tabs(input)) sum += kAskHigh + 4;
     if (input.exam) return sum;
     if (!input.texts.steps.empty()) {
         const ExerciseTexts::Step* step = present_step_words(input);
@@ -474,10 +492,10 @@ void draw_question(
 
 // Where a procedure stands: its steps, what was done, and what went wrong. An exam that runs says
 // what was done alone.
-void draw_standing(Ui& ui, Box& room, const TaskCardInput& input) {
+void draw_standing(Ui& ui, Box& room, const TaskCardInput& input, TaskCardRequest& request) {
     const bool tells = !input.exam || input.replays;
     const ProcedureState& state = input.procedure->state;
-    if (tells) draw_procedure_steps(ui, room, input);
+    if (tells) draw_procedure_steps(ui, room, input, request);
     const std::string done = done_words(input, state);
     if (!done.empty()) draw_small(ui, room, done, 0);
     for (std::size_t k = 0; tells && k < state.complication_s.size(); ++k) {
@@ -530,17 +548,15 @@ void draw_procedure(
     if (question >= 0) return draw_question(ui, room, input, question, request);
     const TrayRows rows =
         tray_rows(room.h, whole_standing(ui, room.w, input, true), tray_cells(input));
-    if (next_question(procedure, state) >= 0) {  // was put off
+    if (question_waits(input) && !has_tabs(input)) {
         ButtonStyle style;
         style.link = true;
-        const char* words = "A question waits";
-        if (ui.button("ask",
-                      room.take_top(kAskHigh, 4).take_left(ui.width(tr(words), Type::body) + 16),
-                      tr(words), style))
+        const float wide = ui.width(tr(kQuestionWaits), Type::body) + 16;
+        if (ui.button("ask", room.take_top(kAskHigh, 4).take_left(wide), tr(kQuestionWaits), style))
             request.put_off = -1;
     }
     draw_tray(ui, room, input, rows, request);  // before the steps: without it nothing can be done
-    draw_standing(ui, room, input);
+    draw_standing(ui, room, input, request);
     draw_values(ui, room, input);
     if (input.exam) return;
     room.take_top(4);
@@ -659,7 +675,7 @@ TaskCardRequest draw_task_card(Ui& ui, const Box& card, const TaskCardInput& inp
     }
     if (input.replays) {
         if (input.procedure != nullptr) {
-            draw_standing(ui, room, input);
+            draw_standing(ui, room, input, request);
             room.take_top(8);
         }
         ui.paragraph(
