@@ -14,8 +14,6 @@ namespace {
 
 // Sums of printed times round: the same recording in another form has the same neighbours.
 constexpr double kRoundS = 1e-6;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kSameReadingS = 0.02;  // ages below this are not recorded
 
 Point3 position(const TrackPoint& p) {

@@ -205,7 +205,7 @@ int structure_cell(double voxel_mm) {
 double structure_depth_bytes(double voxel_mm) {
     const int cell = structure_cell(voxel_mm);
     double bytes = 0;
-    for (const double apart_mm : {kSkinDepthMm, kFatDepthMm})
+    for (const double apart_mm : {kSkinSampleMm, kFatSampleMm})
         bytes += sizeof(float) / std::pow(cell * depth_step(cell * voxel_mm, apart_mm), 3);
     return bytes;
 }

@@ -21,7 +21,7 @@ struct Row {
 };
 
 // One for all: programs end them and their processes differently, and neighbours are alike.
-constexpr Vector3 kVertebra{52, 55, 34}, kRib{75, 90, 80};
+constexpr Vector3 kVertebraSizeMm{52, 55, 34}, kRibSizeMm{75, 90, 80};
 
 // Places (assumed): levels and sides as in any atlas of sectional anatomy, the figures read off CT
 // maps and rounded. Usual volumes: masses of ICRP Publication 89 (2002), adult man, where it has
@@ -183,19 +183,19 @@ constexpr Row kRows[] = {
     {"scapula", 'b', {125, -40, 270}, {20, 25, 30}, 75, {65, 65, 115}, 4, 110, 350, 0.5},
     {"humerus", 'b', {185, 0, 220}, {35, 45, 70}, 160, {45, 45, 320}, 4, 250, 700, 0.8},
     {"brain", ' ', {0, 50, 530}, {18, 40, 60}, 85, {100, 130, 100}, 200, 1400, 2000, 0.2},
-    {"vertebrae_S1", ' ', {0, -24, -93}, {9, 18, 22}, 30, kVertebra, 1, 50, 200, 0.5},
-    {"rib_1", 'b', {42, 15, 300}, {18, 28, 25}, 40, kRib, 0.3, 8, 50, 0.6},
-    {"rib_2", 'b', {68, 25, 278}, {18, 28, 25}, 60, kRib, 0.3, 12, 60, 0.6},
-    {"rib_3", 'b', {90, 30, 255}, {18, 28, 25}, 75, kRib, 0.3, 14, 60, 0.6},
-    {"rib_4", 'b', {104, 32, 232}, {18, 28, 25}, 85, kRib, 0.3, 16, 60, 0.6},
-    {"rib_5", 'b', {115, 34, 210}, {18, 28, 25}, 90, kRib, 0.3, 17, 60, 0.6},
-    {"rib_6", 'b', {124, 35, 188}, {18, 28, 25}, 95, kRib, 0.3, 17, 60, 0.6},
-    {"rib_7", 'b', {130, 34, 166}, {18, 30, 25}, 95, kRib, 0.3, 17, 60, 0.7},
-    {"rib_8", 'b', {134, 28, 145}, {18, 32, 25}, 90, kRib, 0.3, 15, 60, 0.7},
-    {"rib_9", 'b', {136, 15, 122}, {18, 32, 25}, 85, kRib, 0.3, 13, 60, 0.7},
-    {"rib_10", 'b', {128, -8, 100}, {18, 30, 25}, 80, kRib, 0.3, 10, 50, 0.7},
-    {"rib_11", 'b', {103, -45, 82}, {18, 25, 22}, 60, kRib, 0.2, 7, 40, 0.7},
-    {"rib_12", 'b', {60, -53, 82}, {16, 22, 20}, 40, kRib, 0.1, 3.5, 30, 0.7},
+    {"vertebrae_S1", ' ', {0, -24, -93}, {9, 18, 22}, 30, kVertebraSizeMm, 1, 50, 200, 0.5},
+    {"rib_1", 'b', {42, 15, 300}, {18, 28, 25}, 40, kRibSizeMm, 0.3, 8, 50, 0.6},
+    {"rib_2", 'b', {68, 25, 278}, {18, 28, 25}, 60, kRibSizeMm, 0.3, 12, 60, 0.6},
+    {"rib_3", 'b', {90, 30, 255}, {18, 28, 25}, 75, kRibSizeMm, 0.3, 14, 60, 0.6},
+    {"rib_4", 'b', {104, 32, 232}, {18, 28, 25}, 85, kRibSizeMm, 0.3, 16, 60, 0.6},
+    {"rib_5", 'b', {115, 34, 210}, {18, 28, 25}, 90, kRibSizeMm, 0.3, 17, 60, 0.6},
+    {"rib_6", 'b', {124, 35, 188}, {18, 28, 25}, 95, kRibSizeMm, 0.3, 17, 60, 0.6},
+    {"rib_7", 'b', {130, 34, 166}, {18, 30, 25}, 95, kRibSizeMm, 0.3, 17, 60, 0.7},
+    {"rib_8", 'b', {134, 28, 145}, {18, 32, 25}, 90, kRibSizeMm, 0.3, 15, 60, 0.7},
+    {"rib_9", 'b', {136, 15, 122}, {18, 32, 25}, 85, kRibSizeMm, 0.3, 13, 60, 0.7},
+    {"rib_10", 'b', {128, -8, 100}, {18, 30, 25}, 80, kRibSizeMm, 0.3, 10, 50, 0.7},
+    {"rib_11", 'b', {103, -45, 82}, {18, 25, 22}, 60, kRibSizeMm, 0.2, 7, 40, 0.7},
+    {"rib_12", 'b', {60, -53, 82}, {16, 22, 20}, 40, kRibSizeMm, 0.1, 3.5, 30, 0.7},
 };
 
 // L5 up to C1: middle of the whole vertebra, lordosis and kyphosis as a person lies.
@@ -288,7 +288,7 @@ Model make_model() {
              {0, level.y, level.z},
              {9, 18, 9},
              26,
-             kVertebra,
+             kVertebraSizeMm,
              level.ml / 30,
              level.ml,
              3 * level.ml,

@@ -78,7 +78,7 @@ void extend(float reach, CoarseField* field) {
 CoarseField distance_through_fat(const LabelVolume& labels, const std::vector<LabelFacts>& facts) {
     const double voxel_mm = labels.grid.spacing_mm.x;
     CoarseField field;
-    field.step = depth_step(voxel_mm, kFatDepthMm);
+    field.step = depth_step(voxel_mm, kFatSampleMm);
     const Int3 fine = labels.grid.size;
     const int s = field.step;
     field.size = {(fine.x + s - 1) / s, (fine.y + s - 1) / s, (fine.z + s - 1) / s};
@@ -118,7 +118,7 @@ float sparse(float g) {
 }
 
 CoarseField depth_below_skin(const LabelVolume& labels) {
-    const int step = depth_step(labels.grid.spacing_mm.x, kSkinDepthMm);
+    const int step = depth_step(labels.grid.spacing_mm.x, kSkinSampleMm);
     return distance_inside(labels.grid.size, step, [&](int i, int j, int k) {
         return labels.voxels[labels.grid.index(i, j, k)] != 0;
     });

@@ -19,7 +19,7 @@
 namespace sonocase::pipeline::inline anatomy {
 
 // Between samples of the depth below the skin, and of that through fat.
-inline constexpr double kSkinDepthMm = 2, kFatDepthMm = 3;
+inline constexpr double kSkinSampleMm = 2, kFatSampleMm = 3;
 
 // In whole voxels, at least one.
 int depth_step(double voxel_mm, double apart_mm);

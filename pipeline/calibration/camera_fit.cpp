@@ -16,7 +16,7 @@ namespace sonocase::pipeline::inline calibration {
 namespace {
 
 // The corners of one tag in one picture.
-struct TagCost {
+struct CameraTagCost {
     MarkerTag drawn;
     const SeenTag* seen;
     template <class T>
@@ -46,7 +46,7 @@ CameraModel model_of(const std::array<double, kIntrinsics>& c, const CameraModel
     return m;
 }
 
-struct View {
+struct BoardView {
     const MarkerView* seen = nullptr;
     std::array<double, 6> pose{};
     double square = 0;
@@ -60,10 +60,12 @@ const MarkerTag* tag_of(const MarkerBody& board, int id) {
 }
 
 // The board's poses with a camera that is only supposed; what they leave over, per corner.
-double place_boards(const CameraModel& camera, const MarkerBody& board, std::vector<View>& views) {
+double place_boards(const CameraModel& camera,
+                    const MarkerBody& board,
+                    std::vector<BoardView>& views) {
     double sum = 0;
     int found = 0;
-    for (View& view : views) {
+    for (BoardView& view : views) {
         std::vector<TagSight> sights;
         for (const SeenTag& seen : view.seen->tags)
             if (const MarkerTag* tag = tag_of(board, seen.id)) sights.push_back({tag, &seen});
@@ -93,7 +95,7 @@ CameraFit fit_camera(const std::vector<MarkerView>& seen,
     CameraFit fit;
     // Their corners are moved in rounds: what the lens bends is known once the lens is.
     std::vector<MarkerView> unbent = seen;
-    std::vector<View> views(seen.size());
+    std::vector<BoardView> views(seen.size());
     for (std::size_t k = 0; k < seen.size(); ++k) views[k].seen = &unbent[k];
     // The lens may be wide or narrow: the start is the one that fits best.
     CameraModel start;
@@ -107,9 +109,9 @@ CameraFit fit_camera(const std::vector<MarkerView>& seen,
         }
     }
     place_boards(start, board, views);
-    views.erase(
-        std::remove_if(views.begin(), views.end(), [](const View& v) { return v.corners == 0; }),
-        views.end());
+    views.erase(std::remove_if(views.begin(), views.end(),
+                               [](const BoardView& v) { return v.corners == 0; }),
+                views.end());
     fit.views = static_cast<int>(views.size());
     fit.camera = start;
     if (fit.views < options.min_views) {
@@ -124,14 +126,14 @@ CameraFit fit_camera(const std::vector<MarkerView>& seen,
     ceres::Problem problem;
     problem.AddResidualBlock(new ceres::AutoDiffCostFunction<BleedCost, 1, 1>(new BleedCost),
                              nullptr, &bleed);
-    for (View& view : views) {
+    for (BoardView& view : views) {
         for (const SeenTag& tag : view.seen->tags) {
             const MarkerTag* drawn = tag_of(board, tag.id);
             if (!drawn) continue;
-            problem.AddResidualBlock(new ceres::AutoDiffCostFunction<TagCost, 8, kIntrinsics, 6, 1>(
-                                         new TagCost{*drawn, &tag}),
-                                     new ceres::HuberLoss(kHuberOfTag), camera.data(),
-                                     view.pose.data(), &bleed);
+            problem.AddResidualBlock(
+                new ceres::AutoDiffCostFunction<CameraTagCost, 8, kIntrinsics, 6, 1>(
+                    new CameraTagCost{*drawn, &tag}),
+                new ceres::HuberLoss(kHuberOfTag), camera.data(), view.pose.data(), &bleed);
             for (const Pixel& p : tag.corners) {
                 const int column = std::clamp(static_cast<int>(p.x / width_px * kFieldColumns), 0,
                                               kFieldColumns - 1);
@@ -163,13 +165,13 @@ CameraFit fit_camera(const std::vector<MarkerView>& seen,
 
     double square = 0, white = 0;
     Vector3 mean{};
-    for (View& view : views) {
+    for (BoardView& view : views) {
         view.square = 0;
         for (const SeenTag& tag : view.seen->tags) {
             const MarkerTag* drawn = tag_of(board, tag.id);
             if (!drawn) continue;
             double off[8], sigmas[8];
-            TagCost{*drawn, &tag}.off_px(camera.data(), view.pose.data(), &bleed, off);
+            CameraTagCost{*drawn, &tag}.off_px(camera.data(), view.pose.data(), &bleed, off);
             whiten(tag, off, sigmas);
             for (const double o : off) view.square += o * o;
             for (const double r : sigmas) white += r * r;
@@ -180,7 +182,7 @@ CameraFit fit_camera(const std::vector<MarkerView>& seen,
     }
     fit.camera.rms_px = std::sqrt(square / (2 * fit.corners));
     std::vector<Vector3> normals;
-    for (const View& view : views) {
+    for (const BoardView& view : views) {
         double m[9];
         ceres::AngleAxisToRotationMatrix(view.pose.data(), m);
         normals.push_back({m[6], m[7], m[8]});

@@ -18,7 +18,7 @@ namespace sonocase::pipeline::inline check {
 
 namespace {
 
-constexpr int kPanelPx = kSheetPx, kCaptionPx = 26, kGapPx = 10, kColumns = 4;
+constexpr int kSheetPanelPx = kSheetPx, kCaptionPx = 26, kGapPx = 10, kColumns = 4;
 
 using Colour = std::array<std::uint8_t, 3>;
 
@@ -26,12 +26,13 @@ using Colour = std::array<std::uint8_t, 3>;
 struct Panel {
     std::string caption;
     std::string left, right;  // letters at its edges: the patient's sides
-    std::vector<std::uint8_t> rgb = std::vector<std::uint8_t>(3 * kPanelPx * kPanelPx, 255);
+    std::vector<std::uint8_t> rgb =
+        std::vector<std::uint8_t>(3 * kSheetPanelPx * kSheetPanelPx, 255);
 
     void plot(int x, int y, Colour colour) {
-        if (x < 0 || y < 0 || x >= kPanelPx || y >= kPanelPx) return;
+        if (x < 0 || y < 0 || x >= kSheetPanelPx || y >= kSheetPanelPx) return;
         std::copy(colour.begin(), colour.end(),
-                  rgb.begin() + 3 * (static_cast<std::ptrdiff_t>(y) * kPanelPx + x));
+                  rgb.begin() + 3 * (static_cast<std::ptrdiff_t>(y) * kSheetPanelPx + x));
     }
 };
 
@@ -42,14 +43,14 @@ struct View {
     double mm_per_px = 1;
 
     Point3 at(int x, int y) const {
-        return middle + (x - kPanelPx / 2) * mm_per_px * across +
-               (y - kPanelPx / 2) * mm_per_px * down;
+        return middle + (x - kSheetPanelPx / 2) * mm_per_px * across +
+               (y - kSheetPanelPx / 2) * mm_per_px * down;
     }
 };
 
 void draw_labels(const CaseLabels& labels, const View& view, Panel& panel) {
-    for (int y = 0; y < kPanelPx; ++y)
-        for (int x = 0; x < kPanelPx; ++x) {
+    for (int y = 0; y < kSheetPanelPx; ++y)
+        for (int x = 0; x < kSheetPanelPx; ++x) {
             const int label = labels.label(view.at(x, y));
             panel.plot(x, y,
                        label == 0 ? Colour{0, 0, 0}
@@ -62,8 +63,8 @@ void stroke(const View& view, Point3 from, Point3 to, Colour colour, Panel& pane
         const Vector3 at = from + (s / 800.0) * (to - from) - view.middle;
         const int x = static_cast<int>(std::lround(dot(at, view.across) / view.mm_per_px)),
                   y = static_cast<int>(std::lround(dot(at, view.down) / view.mm_per_px));
-        panel.plot(x + kPanelPx / 2, y + kPanelPx / 2, colour);
-        panel.plot(x + kPanelPx / 2 + 1, y + kPanelPx / 2, colour);
+        panel.plot(x + kSheetPanelPx / 2, y + kSheetPanelPx / 2, colour);
+        panel.plot(x + kSheetPanelPx / 2 + 1, y + kSheetPanelPx / 2, colour);
     }
 }
 
@@ -100,17 +101,17 @@ std::vector<Panel> planes(const CaseLabels& labels, const PatientAxes& axes) {
     double longest = 0;
     for (int axis = 0; axis < 3; ++axis)
         longest = std::max(longest, grid.size[axis] * grid.spacing_mm[axis]);
-    view.mm_per_px = longest / kPanelPx;
-    struct Plane {
+    view.mm_per_px = longest / kSheetPanelPx;
+    struct CutPlane {
         const char* caption;
         Vector3 across, down;
         const char *left, *right;
     };
-    const Plane all[] = {{"axial", -axes.right, -axes.front, "R", "L"},
-                         {"coronal", -axes.right, -axes.up, "R", "L"},
-                         {"sagittal", -axes.front, -axes.up, "A", "P"}};
+    const CutPlane all[] = {{"axial", -axes.right, -axes.front, "R", "L"},
+                            {"coronal", -axes.right, -axes.up, "R", "L"},
+                            {"sagittal", -axes.front, -axes.up, "A", "P"}};
     std::vector<Panel> panels;
-    for (const Plane& plane : all) {
+    for (const CutPlane& plane : all) {
         view.across = plane.across;
         view.down = plane.down;
         Panel panel;
@@ -126,15 +127,17 @@ std::vector<Panel> planes(const CaseLabels& labels, const PatientAxes& axes) {
 Panel in_space(const CaseBundle& bundle, const char* caption, Vector3 along, Vector3 up) {
     std::vector<Point3> marks;
     for (const NamedTarget& target : exercise_targets(bundle)) marks.push_back(target.centre);
-    const BodyView view = body_view(bundle, along, up, marks, kPanelPx);
+    const BodyView view = body_view(bundle, along, up, marks, kSheetPanelPx);
     Panel panel;
     panel.caption = caption;
     const double scale =
-        static_cast<double>(std::max({view.width_px, view.height_px, 1})) / kPanelPx;
-    for (int y = 0; y < kPanelPx; ++y)
-        for (int x = 0; x < kPanelPx; ++x) {
-            const int from_x = static_cast<int>((x - kPanelPx / 2) * scale + view.width_px / 2.0),
-                      from_y = static_cast<int>((y - kPanelPx / 2) * scale + view.height_px / 2.0);
+        static_cast<double>(std::max({view.width_px, view.height_px, 1})) / kSheetPanelPx;
+    for (int y = 0; y < kSheetPanelPx; ++y)
+        for (int x = 0; x < kSheetPanelPx; ++x) {
+            const int from_x =
+                          static_cast<int>((x - kSheetPanelPx / 2) * scale + view.width_px / 2.0),
+                      from_y =
+                          static_cast<int>((y - kSheetPanelPx / 2) * scale + view.height_px / 2.0);
             if (from_x < 0 || from_y < 0 || from_x >= view.width_px || from_y >= view.height_px)
                 continue;
             const std::uint8_t* pixel =
@@ -150,7 +153,7 @@ Panel window(const CaseLabels& labels, const Exercise& exercise) {
     const SweepKey& start = exercise.sweeps.front().keys.front();
     View view;
     const double depth_mm = exercise.probe.depth_mm;
-    view.mm_per_px = (depth_mm + 40) / kPanelPx;
+    view.mm_per_px = (depth_mm + 40) / kSheetPanelPx;
     view.down = normalized(start.beam);
     view.across = normalized(start.lateral - dot(start.lateral, view.down) * view.down);
     view.middle = start.probe + (0.5 * depth_mm) * view.down;
@@ -181,7 +184,8 @@ Panel ultrasound_panel(const std::string& exercise,
     const auto found = ultrasound.find(exercise);
     if (found == ultrasound.end()) return panel;
     const auto picture = grey_from_png(found->second);
-    if (!picture || picture->width_px != kPanelPx || picture->height_px != kPanelPx) return panel;
+    if (!picture || picture->width_px != kSheetPanelPx || picture->height_px != kSheetPanelPx)
+        return panel;
     panel.caption = "ultrasound";
     for (std::size_t n = 0; n < picture->pixels.size(); ++n)
         std::fill_n(panel.rgb.begin() + 3 * static_cast<std::ptrdiff_t>(n), 3, picture->pixels[n]);
@@ -189,8 +193,9 @@ Panel ultrasound_panel(const std::string& exercise,
 }
 
 void paste(const Panel& panel, int x0, int y0, int width, std::vector<std::uint8_t>& rgb) {
-    for (int y = 0; y < kPanelPx; ++y)
-        std::copy_n(panel.rgb.begin() + 3 * static_cast<std::ptrdiff_t>(y) * kPanelPx, 3 * kPanelPx,
+    for (int y = 0; y < kSheetPanelPx; ++y)
+        std::copy_n(panel.rgb.begin() + 3 * static_cast<std::ptrdiff_t>(y) * kSheetPanelPx,
+                    3 * kSheetPanelPx,
                     rgb.begin() + 3 * (static_cast<std::ptrdiff_t>(y0 + y) * width + x0));
 }
 
@@ -215,8 +220,8 @@ std::vector<std::uint8_t> case_sheet(
     }
     const int rows = static_cast<int>((panels.size() + kColumns - 1) / kColumns);
     constexpr int kTitlePx = 44;
-    const int width = kColumns * (kPanelPx + kGapPx) + kGapPx,
-              height = kTitlePx + rows * (kPanelPx + kCaptionPx + kGapPx);
+    const int width = kColumns * (kSheetPanelPx + kGapPx) + kGapPx,
+              height = kTitlePx + rows * (kSheetPanelPx + kCaptionPx + kGapPx);
     Canvas canvas(width, height);
     canvas.text(bundle.manifest.case_name + text(": %zu structures, %zu exercises, %zu faults",
                                                  bundle.labels.size() - 1, bundle.exercises.size(),
@@ -224,16 +229,16 @@ std::vector<std::uint8_t> case_sheet(
                 {kGapPx, height - 30.0}, {.size_px = 18, .bold = true});
     const auto place = [&](std::size_t n) {
         return std::pair{
-            kGapPx + static_cast<int>(n % kColumns) * (kPanelPx + kGapPx),
-            kTitlePx + static_cast<int>(n / kColumns) * (kPanelPx + kCaptionPx + kGapPx)};
+            kGapPx + static_cast<int>(n % kColumns) * (kSheetPanelPx + kGapPx),
+            kTitlePx + static_cast<int>(n / kColumns) * (kSheetPanelPx + kCaptionPx + kGapPx)};
     };
     for (std::size_t n = 0; n < panels.size(); ++n) {
         const auto [x, y] = place(n);
-        const double base = height - y - kPanelPx - 18.0;  // the canvas counts from below
-        canvas.text(panels[n].caption, {x + kPanelPx / 2.0, base},
+        const double base = height - y - kSheetPanelPx - 18.0;  // the canvas counts from below
+        canvas.text(panels[n].caption, {x + kSheetPanelPx / 2.0, base},
                     {.size_px = 13, .anchor = TextAnchor::middle});
         canvas.text(panels[n].left, {double(x), base}, {.size_px = 13, .bold = true});
-        canvas.text(panels[n].right, {double(x + kPanelPx), base},
+        canvas.text(panels[n].right, {double(x + kSheetPanelPx), base},
                     {.size_px = 13, .bold = true, .anchor = TextAnchor::end});
     }
     std::vector<std::uint8_t> rgb = canvas.rgb();

@@ -145,7 +145,7 @@ const HtmlTemplate& html() {
     return page;
 }
 
-std::string number(double value) {
+std::string figure(double value) {
     return fixed_text(value, value < 10 ? 1 : 0);
 }
 
@@ -242,8 +242,8 @@ std::string unknown_part(const CaseBundle& bundle) {
         rows += html().filled(
             "unknown_row",
             {{"label", escaped_html(place.label + (place.target ? " (has a target)" : ""))},
-             {"mm", number(place.p90_mm)},
-             {"held", place.with_landmarks_mm > 0 ? number(place.with_landmarks_mm) : ""}});
+             {"mm", figure(place.p90_mm)},
+             {"held", place.with_landmarks_mm > 0 ? figure(place.with_landmarks_mm) : ""}});
     }
     for (const Step& step : kSteps)
         legend += html().filled(
@@ -283,17 +283,17 @@ std::string target_rows(const CaseBundle& bundle, const CheckResult& result) {
     const std::vector<UnknownPlace> places = unknown_places(bundle.manifest.stages);
     const auto within = [&](const std::string& label) {
         for (const UnknownPlace& place : places)
-            if (place.label == label) return number(place.p90_mm);
+            if (place.label == label) return figure(place.p90_mm);
         return std::string();
     };
     for (const TargetRow& t : result.targets)
         rows += html().filled("target", {{"exercise", escaped_html(t.exercise)},
                                          {"target", escaped_html(t.target)},
                                          {"windows", std::to_string(t.windows)},
-                                         {"depth", number(t.depth_mm)},
-                                         {"blocked", number(100 * t.blocked)},
+                                         {"depth", figure(t.depth_mm)},
+                                         {"blocked", figure(100 * t.blocked)},
                                          {"needle", t.needle ? "yes" : "no"},
-                                         {"visible", number(100 * t.visible)},
+                                         {"visible", figure(100 * t.visible)},
                                          {"within", within(t.inside)}});
     return rows;
 }
@@ -324,8 +324,8 @@ std::string organ_rows(const CheckResult& result) {
             "organ",
             {{"label", escaped_html(organ.label)},
              {"class", odd ? "bad" : ""},
-             {"ml", number(organ.ml)},
-             {"normal", known ? number(organ.low_ml) + " to " + number(organ.high_ml) : ""}});
+             {"ml", figure(organ.ml)},
+             {"normal", known ? figure(organ.low_ml) + " to " + figure(organ.high_ml) : ""}});
     }
     return rows;
 }

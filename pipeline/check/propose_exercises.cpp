@@ -182,7 +182,7 @@ std::vector<Point3> target_places(std::vector<Inside> places, double radius_mm, 
 std::string triple(Point3 p) {
     return text("[%.1f, %.1f, %.1f]", p.x, p.y, p.z);
 }
-std::string direction(Vector3 v) {
+std::string short_direction(Vector3 v) {
     return text("[%.4f, %.4f, %.4f]", v.x, v.y, v.z);
 }
 
@@ -246,8 +246,8 @@ std::string with_places(const Template& from,
         else if (table.empty() && key == "start_probe")
             out += "start_probe = " + triple(window.skin) + "\n";
         else if (table.empty() && key == "start_beam")
-            out += "start_beam = " + direction(window.beam) +
-                   "\nstart_lateral = " + direction(window.lateral) + "\n";
+            out += "start_beam = " + short_direction(window.beam) +
+                   "\nstart_lateral = " + short_direction(window.lateral) + "\n";
         else if (table.empty() && key == "start_lateral")
             ;  // stands beside the beam
         else if (table.empty() && key == "no_go")

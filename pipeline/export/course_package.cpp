@@ -183,7 +183,7 @@ std::string scorm_manifest(const Course& course, std::span<const SiteFile> files
     return out + "    </resource>\n  </resources>\n</manifest>\n";
 }
 
-class Bytes {
+class ByteWriter {
   public:
     void put(std::uint32_t value, int count) {
         for (int n = 0; n < count; ++n) data.push_back(static_cast<std::uint8_t>(value >> 8 * n));
@@ -249,7 +249,7 @@ Result<std::vector<std::uint8_t>> zip_of(std::span<const SiteFile> files) {
     if (total >= kMost)
         return Error{"the package would have " + std::to_string(total >> 20) + " MB", "--package",
                      "at most 4 GB: give fewer cases, or cook them with --preset draft"};
-    Bytes out, directory;
+    ByteWriter out, directory;
     for (const SiteFile& file : files) {
         const std::vector<std::uint8_t> packed = deflated(file.bytes);
         const bool smaller = packed.size() < file.bytes.size();
@@ -257,7 +257,7 @@ Result<std::vector<std::uint8_t>> zip_of(std::span<const SiteFile> files) {
         const auto crc = static_cast<std::uint32_t>(
             crc32(crc32(0, nullptr, 0), file.bytes.data(), static_cast<uInt>(file.bytes.size())));
         const auto at = static_cast<std::uint32_t>(out.data.size());
-        const auto facts = [&](Bytes& to) {
+        const auto facts = [&](ByteWriter& to) {
             to.put(20, 2);  // version needed: 2.0, deflate
             to.put(0, 2);
             to.put(smaller ? 8 : 0, 2);

@@ -14,6 +14,7 @@
 #include "formats/base/constants.h"
 #include "formats/flow/flow_velocity.h"
 #include "formats/volume/tissue.h"
+#include "pipeline/flow/vessel_parts.h"
 
 namespace sonocase::pipeline::inline flow {
 
@@ -24,10 +25,6 @@ constexpr double kPortalMm = 75, kPortalMinMm = 110;  // from the liver to the c
 constexpr double kLevelMm = 5, kFromSpineMm = 120;    // of a node from a vertebra's level and place
 constexpr double kInLiver = 0.4;                      // share of the places round an end
 constexpr int kRounds = 6;
-
-bool contains(const std::string& text, const char* word) {
-    return text.find(word) != std::string::npos;
-}
 
 // Returns the area of the middle one of a course's sections, by size.
 double median_area(const VesselCourse& course) {
@@ -214,7 +211,7 @@ double VesselNetwork::trunk_first(const VesselCourse& c,
                                   bool last,
                                   const Landmarks::Level& renal) const {
     const std::string& name = labels_.labels[c.label].name;
-    if (!contains(name, "aorta") && !contains(name, "cava")) return 1;
+    if (!holds_word(name, "aorta") && !holds_word(name, "cava")) return 1;
     if (!renal.known) return 4;
     const Point3 end = last ? c.nodes.back().centre : c.nodes.front().centre;
     return dot(end - renal.place, renal.axis) > 0 ? 16 : 4;
@@ -237,7 +234,7 @@ double VesselNetwork::liver_share(const VesselCourse& c, bool last) const {
                 ++count;
                 if (!labels_.grid.contains(x, y, z)) continue;
                 const auto label = labels_.voxels[labels_.grid.index(x, y, z)];
-                liver += contains(labels_.labels[label].name, "liver");
+                liver += holds_word(labels_.labels[label].name, "liver");
             }
     return static_cast<double>(liver) / count;
 }
@@ -302,7 +299,7 @@ int VesselNetwork::cut_at(const char* word, const Landmarks::Level& level) {
     std::size_t best_edge = 0, best_node = 0;
     double nearest = kLevelMm;
     for (std::size_t e = 0; e < edges_.size(); ++e) {
-        if (!contains(name_of(edges_[e]), word)) continue;
+        if (!holds_word(name_of(edges_[e]), word)) continue;
         const auto& nodes = edges_[e].course.nodes;
         for (std::size_t i = 0; i < nodes.size(); ++i) {
             const double away = std::abs(dot(nodes[i].centre - level.place, level.axis));
@@ -358,7 +355,7 @@ void VesselNetwork::add_taps(const Landmarks& landmarks) {
         }
     }
     for (std::size_t e = 0; e < edges_.size(); ++e)
-        if (contains(name_of(edges_[e]), "iliac"))
+        if (holds_word(name_of(edges_[e]), "iliac"))
             if (tap_along(e, kInternalIliacMm, kInternalIliacMinMm, Outlet::internal_iliac))
                 ++e;  // the part beyond the cut is not a common iliac
 }
@@ -370,13 +367,13 @@ void VesselNetwork::add_ends(const SolvedOutlets& solved) {
         NetworkOutlet end;
         end.node = e.course.last;
         const std::string name = name_of(e);
-        if (contains(name, "iliac") || contains(name, "femor")) end.what = Outlet::leg;
+        if (holds_word(name, "iliac") || holds_word(name, "femor")) end.what = Outlet::leg;
         if (kind_ == FlowKind::portal) {
             if (liver_share(e.course, true) > kInLiver)
                 end.sign = -1;
             else
-                end.what = contains(name, "splenic") && !splenic_given_ ? Outlet::splenic
-                                                                        : Outlet::mesenteric;
+                end.what = holds_word(name, "splenic") && !splenic_given_ ? Outlet::splenic
+                                                                          : Outlet::mesenteric;
             splenic_given_ |= end.what == Outlet::splenic;
         }
         outlets_.push_back(end);
@@ -542,10 +539,10 @@ Landmarks find_landmarks(const LabelVolume& labels) {
     std::array<int, 256> which{};
     for (std::size_t l = 1; l < labels.labels.size(); ++l) {
         const std::string& name = labels.labels[l].name;
-        which[l] = contains(name, "vertebrae_T12")  ? 1
-                   : contains(name, "vertebrae_L1") ? 2
-                   : contains(name, "vertebrae_L2") ? 3
-                                                    : 0;
+        which[l] = holds_word(name, "vertebrae_T12")  ? 1
+                   : holds_word(name, "vertebrae_L1") ? 2
+                   : holds_word(name, "vertebrae_L2") ? 3
+                                                      : 0;
     }
     std::array<Vector3, 4> sum{};
     std::array<double, 4> count{};

@@ -8,13 +8,10 @@
 #include <vector>
 
 #include "formats/base/constants.h"
+#include "pipeline/flow/vessel_parts.h"
 
 namespace sonocase::pipeline::inline flow {
 namespace {
-
-bool contains(std::string_view text, std::string_view word) {
-    return text.find(word) != std::string_view::npos;
-}
 
 // The shapes are (assumed), from published resistive indices and the triphasic pattern of a leg at
 // rest.
@@ -113,14 +110,14 @@ FlowWave named_wave(std::string_view name) {
 
 VesselReference vessel_reference(std::string_view label, FlowKind kind) {
     if (kind == FlowKind::artery) {
-        if (contains(label, "aorta")) return {775, 250, 7};
-        if (contains(label, "iliac")) return {1150, 250, 3.5};
-        if (contains(label, "femor")) return {1140, 250, 3};
-        if (contains(label, "carotid")) return {850, 250, 4};
+        if (holds_word(label, "aorta")) return {775, 250, 7};
+        if (holds_word(label, "iliac")) return {1150, 250, 3.5};
+        if (holds_word(label, "femor")) return {1140, 250, 3};
+        if (holds_word(label, "carotid")) return {850, 250, 4};
         return {0, 0, 3};
     }
     if (kind == FlowKind::portal) return {180, 20, 3};  // of the portal vein itself
-    return {0, 0, contains(label, "cava") ? 4.0 : 3.0};
+    return {0, 0, holds_word(label, "cava") ? 4.0 : 3.0};
 }
 
 double usual_mean_mm_s(FlowKind kind) {

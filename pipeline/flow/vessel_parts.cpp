@@ -9,10 +9,6 @@
 namespace sonocase::pipeline::inline flow {
 namespace {
 
-bool contains(std::string_view text, std::string_view word) {
-    return text.find(word) != std::string_view::npos;
-}
-
 struct Box {
     Int3 low{INT32_MAX, INT32_MAX, INT32_MAX}, high{INT32_MIN, INT32_MIN, INT32_MIN};
     bool empty() const { return low.x > high.x; }
@@ -140,12 +136,12 @@ VesselPart piece_alone(const VesselPart& part,
 
 std::optional<FlowKind> flow_kind(std::string_view label, std::string_view tissue) {
     const Vessel vessel = vessel_of_label(label);
-    if (vessel == Vessel::thrombus || contains(label, "heart") || contains(label, "atri"))
+    if (vessel == Vessel::thrombus || holds_word(label, "heart") || holds_word(label, "atri"))
         return std::nullopt;
-    const bool blood = contains(tissue, "blood") || contains(tissue, "vessel") ||
+    const bool blood = holds_word(tissue, "blood") || holds_word(tissue, "vessel") ||
                        tissue == "vein" || tissue == "artery";
     if (!blood) return std::nullopt;
-    if (contains(label, "portal")) return FlowKind::portal;
+    if (holds_word(label, "portal")) return FlowKind::portal;
     return vessel == Vessel::vein || tissue == "vein" ? FlowKind::vein : FlowKind::artery;
 }
 

@@ -15,6 +15,11 @@
 
 namespace sonocase::pipeline::inline flow {
 
+// True if the name of a label has this word or beginning in it.
+inline bool holds_word(std::string_view label, std::string_view word) {
+    return label.find(word) != std::string_view::npos;
+}
+
 // Returns the system that a label belongs to, by words of its name and its tissue (`blood`, or one
 // named like it). None for what holds no flowing blood: other tissues, a thrombus, the heart.
 std::optional<FlowKind> flow_kind(std::string_view label, std::string_view tissue);

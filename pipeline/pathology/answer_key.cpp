@@ -8,16 +8,13 @@
 #include <string_view>
 
 #include "formats/base/digest.h"
+#include "pipeline/pathology/label_canvas.h"
 #include "pipeline/segmentation/distance/marked_distance.h"
 
 namespace sonocase::pipeline::inline pathology {
 namespace {
 
 constexpr double kDepthReachMm = 150, kVesselReachMm = 40;
-
-Vector3 as_vector(Int3 v) {
-    return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
-}
 
 // The distance from some voxels to the nearest voxel of these labels, mm, and which label that is;
 // limit_mm and 0 if there is none within limit_mm. The search widens step by step; beyond 24 mm it

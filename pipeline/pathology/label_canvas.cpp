@@ -17,10 +17,6 @@ std::size_t place_in_brick(Int3 v) {
                                     kBrickEdge * kBrickEdge * (v.z % kBrickEdge));
 }
 
-Vector3 as_vector(Int3 v) {
-    return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
-}
-
 // Calls visit(n, v) for the voxels of a range in order, x fastest.
 template <class Visit>
 void each_voxel(const VoxelRange& range, Visit visit) {

@@ -19,6 +19,9 @@ namespace sonocase::pipeline::inline pathology {
 
 // A function of continuous voxel coordinates: a rank, or a signed distance in voxels.
 using VoxelField = std::function<double(Vector3 voxel)>;
+inline Vector3 as_vector(Int3 v) {
+    return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
+}
 
 // The voxels from low to high, both included.
 struct VoxelRange {

@@ -9,7 +9,7 @@
 namespace sonocase::pipeline::inline pictures {
 namespace {
 
-constexpr double kGapPx = 8;  // between the labels of ticks
+constexpr double kTickGapPx = 8;  // between the labels of ticks
 
 // 10, 0.002, 5e6, 1e-7
 std::string short_number(double value, int digits) {
@@ -67,7 +67,7 @@ bool labels_fit(const Axis& axis, const std::vector<Tick>& ticks, bool upright) 
         if (tick.label.empty()) continue;
         const double half = 0.5 * (upright ? kTickTextPx : text_width_px(tick.label, kTickStyle));
         if (axis.place(tick.value) - half < end) return false;
-        end = axis.place(tick.value) + half + kGapPx;
+        end = axis.place(tick.value) + half + kTickGapPx;
     }
     return true;
 }

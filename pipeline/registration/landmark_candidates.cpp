@@ -22,8 +22,8 @@ constexpr double kPlaceMm = 25;                // across one extreme
 constexpr int kPanelPx = 360;
 
 // The patient's axes: right, front, up.
-struct Axes {
-    Axes(Vector3 given_up, Vector3 given_front) {
+struct BodyAxes {
+    BodyAxes(Vector3 given_up, Vector3 given_front) {
         up = normalized(given_up);
         front = normalized(given_front - dot(given_front, up) * up);
         right = cross(front, up);
@@ -123,7 +123,7 @@ double dimple_mm(const std::vector<Point3>& front, Point3 p) {
     return fit[0] - inner / inside;
 }
 
-void add_navel(const Axes& axes,
+void add_navel(const BodyAxes& axes,
                const std::vector<Point3>& points,
                double middle,
                double low,
@@ -159,7 +159,7 @@ std::vector<LandmarkCandidate> landmark_candidates(const Surface& skin,
                                                    Vector3 given_front) {
     std::vector<LandmarkCandidate> out;
     if (skin.points.size() < kMinPoints) return out;
-    const Axes axes(up, given_front);
+    const BodyAxes axes(up, given_front);
     std::vector<Point3> points;
     Box3 box;
     for (const Point3 p : skin.points) {
@@ -219,7 +219,7 @@ std::vector<std::uint8_t> landmark_picture(const std::vector<CandidateView>& vie
     };
     for (std::size_t n = 0; n < views.size(); ++n) {
         const CandidateView& view = views[n];
-        const Axes axes(view.up, view.front);
+        const BodyAxes axes(view.up, view.front);
         Box3 box;
         for (const Point3 p : view.skin->points) box.include(axes.body(p));
         if (box.empty()) continue;

@@ -10,6 +10,8 @@
 #endif
 #include <nlohmann/json.hpp>
 
+#include "pipeline/import/mesh/polygon_file.h"
+
 namespace sonocase::pipeline::inline import_mesh {
 namespace {
 
@@ -17,7 +19,6 @@ using Json = nlohmann::json;
 
 constexpr std::uint32_t kMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinChunk = 0x004E4942;
 constexpr std::size_t kTriangles = 4, kStrip = 5, kFan = 6;  // modes of a primitive
-constexpr const char* kAgain = "check that the file is complete; export it again";
 
 std::uint32_t word_at(std::span<const std::uint8_t> bytes, std::size_t at) {
     std::uint32_t word = 0;
@@ -172,7 +173,7 @@ class Reader {
         const Json& value = member(object, key);
         return value.is_null() ? otherwise : index(value);
     }
-    Error fault(const std::string& what) const { return {what, where_, kAgain}; }
+    Error fault(const std::string& what) const { return {what, where_, kExportMeshAgain}; }
 
     static Affine transform(const Json& node) {
         Affine out;
@@ -333,14 +334,14 @@ Result<std::vector<MeshNode>> read_glb(std::span<const std::uint8_t> bytes,
     if (word_at(bytes, 8) > bytes.size())
         return Error{"the file is cut off: " + std::to_string(bytes.size()) + " of " +
                          std::to_string(word_at(bytes, 8)) + " bytes",
-                     where, kAgain};
+                     where, kExportMeshAgain};
     const std::size_t json_bytes = word_at(bytes, 12);
     if (word_at(bytes, 16) != kJsonChunk || json_bytes > bytes.size() - 20)
-        return Error{"its first chunk is not its description", where, kAgain};
+        return Error{"its first chunk is not its description", where, kExportMeshAgain};
     const char* text = reinterpret_cast<const char*>(bytes.data() + 20);
     const Json json = Json::parse(text, text + json_bytes, nullptr, false);
     if (json.is_discarded() || !json.is_object())
-        return Error{"its description is not JSON", where, kAgain};
+        return Error{"its description is not JSON", where, kExportMeshAgain};
     std::span<const std::uint8_t> bin;
     const std::size_t next = 20 + json_bytes;
     if (bytes.size() >= next + 8 && word_at(bytes, next + 4) == kBinChunk)

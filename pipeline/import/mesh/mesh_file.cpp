@@ -377,8 +377,6 @@ bool is_mesh_file(const std::string& path) {
 
 namespace {
 
-constexpr const char* kAgain = "check that the file is complete; export it again";
-
 // All nodes of a GLB as one surface.
 Result<PolygonFile> read_gltf(const std::string& path, Axes told, StageReport* report) {
     SONOCASE_TRY(const auto bytes, read_file(path));
@@ -422,7 +420,7 @@ Result<vtkSmartPointer<vtkPolyData>> read_polygons(const std::string& path,
                         : "cannot be read as VTP: the file is damaged or of another kind";
         else if (names_no_vertex(*data))
             error = "a polygon names a vertex that does not exist";
-        if (!error.empty()) return Error{error, path, kAgain};
+        if (!error.empty()) return Error{error, path, kExportMeshAgain};
         SONOCASE_TRY(out.axes, obj ? axes_of_obj(path) : axes_of_fields(*data, path));
         return data;
     }
@@ -473,7 +471,7 @@ Result<MeshFile> read_mesh_file(const std::string& path,
         out.surface = surface_of(*clean->GetOutput());
         return out;
     } catch (const std::exception&) {
-        return Error{"cannot be read as a mesh: the file is damaged", path, kAgain};
+        return Error{"cannot be read as a mesh: the file is damaged", path, kExportMeshAgain};
     }
 }
 

@@ -297,8 +297,6 @@ Result<PolygonFile> read_ply_file(const std::string& path) {
 
 namespace {
 
-constexpr const char* kAgain = "check that the file is complete; export it again";
-
 bool vtk_type_named(std::string word, Type* type) {
     word = lower_case(word);
     static const std::pair<const char*, Type> kNames[] = {
@@ -351,7 +349,7 @@ class VtkReader {
     }
 
   private:
-    Error bad(const std::string& what) const { return {what, path_, kAgain}; }
+    Error bad(const std::string& what) const { return {what, path_, kExportMeshAgain}; }
 
     std::string line() {
         const std::size_t end = std::min(bytes_.find('\n', at_), bytes_.size());
@@ -564,17 +562,17 @@ class StlText {
                     const auto value = number_in(number);
                     if (!value)
                         return Error{"'" + number.substr(0, 40) + "' is not a number", where(),
-                                     kAgain};
+                                     kExportMeshAgain};
                     file_.corners.push_back(static_cast<float>(*value));
                 }
             } else if (word == "endfacet") {
                 if (corners != 3)
                     return Error{"a facet has " + std::to_string(corners) + " corners", where(),
-                                 kAgain};
+                                 kExportMeshAgain};
                 corners = 0;
             }
         }
-        if (solids == 0) return Error{"not an STL file", path_, kAgain};
+        if (solids == 0) return Error{"not an STL file", path_, kExportMeshAgain};
         if (open || corners != 0)
             return Error{"STL file is cut off: its last line is not 'endsolid'", path_,
                          "export it again; if it is whole, add the line endsolid"};
@@ -642,13 +640,14 @@ Result<TriangleFile> read_stl_file(const std::string& path) {
         std::string_view text = bytes;
         if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
         if (is_stl_text(text)) return StlText(text, path).read();
-        if (bytes.size() < 84) return Error{"not an STL file", path, kAgain};
+        if (bytes.size() < 84) return Error{"not an STL file", path, kExportMeshAgain};
         if (bytes.size() < size)
             return Error{"STL file is cut off: it holds " +
                              std::to_string((bytes.size() - 84) / 50) + " of " +
                              std::to_string(count) + " triangles",
-                         path, kAgain};
-        if (count == 0) return Error{"STL file says that it holds no triangle", path, kAgain};
+                         path, kExportMeshAgain};
+        if (count == 0)
+            return Error{"STL file says that it holds no triangle", path, kExportMeshAgain};
     }
     TriangleFile file;
     const std::string header(bytes.substr(0, 80));

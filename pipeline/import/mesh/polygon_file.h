@@ -14,6 +14,9 @@
 
 namespace sonocase::pipeline::inline import_mesh {
 
+inline constexpr const char* kExportMeshAgain =
+    "check that the file is complete; export it again";  // advice of every reader of meshes
+
 struct PolygonFile {
     std::vector<Point3> points;
     std::vector<Vector3> normals;  // # points, or empty

@@ -28,7 +28,7 @@ namespace sonocase::pipeline::inline import_mesh {
 namespace {
 
 constexpr std::size_t kDensePoints = 60000;  // a cloud of more is reduced
-constexpr double kCubeMm = 5;
+constexpr double kThinningMm = 5;
 constexpr double kFarMm = 5e5;  // 32 bits are good for 0.03 mm there
 constexpr int kBlock = 10;      // cubes along a block, within which cubes are compared
 constexpr std::size_t kFew = 3, kTimesAsMany = 5;
@@ -53,7 +53,7 @@ std::vector<Cube> cubes_of(const std::vector<Point3>& points) {
     std::vector<std::pair<std::uint64_t, std::uint32_t>> keyed;
     keyed.reserve(points.size());
     for (std::size_t i = 0; i < points.size(); ++i)
-        keyed.push_back({key_of(points[i], kCubeMm), static_cast<std::uint32_t>(i)});
+        keyed.push_back({key_of(points[i], kThinningMm), static_cast<std::uint32_t>(i)});
     std::sort(keyed.begin(), keyed.end());
     std::vector<Cube> cubes;
     for (std::size_t n = 0; n < keyed.size();) {
@@ -64,7 +64,7 @@ std::vector<Cube> cubes_of(const std::vector<Point3>& points) {
         Cube cube;
         cube.readings = end - n;
         cube.mean = Point3{} + sum / static_cast<double>(cube.readings);
-        cube.block = key_of(cube.mean, kBlock * kCubeMm);
+        cube.block = key_of(cube.mean, kBlock * kThinningMm);
         cubes.push_back(cube);
         n = end;
     }
@@ -97,7 +97,7 @@ std::unordered_map<std::uint64_t, std::size_t> usual_sizes(const std::vector<Cub
 
 // The largest usual size in the blocks round a cube.
 std::size_t usual_near(const std::unordered_map<std::uint64_t, std::size_t>& usual, Point3 p) {
-    constexpr double kEdgeMm = kBlock * kCubeMm;
+    constexpr double kEdgeMm = kBlock * kThinningMm;
     std::size_t largest = 0;
     for (int n = 0; n < 27; ++n) {
         const Vector3 aside{double(n % 3 - 1), double(n / 3 % 3 - 1), double(n / 9 - 1)};

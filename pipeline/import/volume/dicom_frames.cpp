@@ -16,13 +16,6 @@
 namespace sonocase::pipeline::inline import_volume {
 namespace {
 
-constexpr DicomTag kSyntax = 0x00020010, kThickness = 0x00180050, kBetween = 0x00180088,
-                   kPosition = 0x00200032, kOrientation = 0x00200037, kPlanePosition = 0x00209113,
-                   kPlaneOrientation = 0x00209116, kPixelSpacing = 0x00280030,
-                   kPixelMeasures = 0x00289110, kSegmentIdentification = 0x0062000a,
-                   kReferencedSegment = 0x0062000b, kShared = 0x52009229, kPerFrame = 0x52009230,
-                   kPixels = 0x7fe00010, kItem = 0xfffee000, kItemEnd = 0xfffee00d,
-                   kSequenceEnd = 0xfffee0dd;
 constexpr std::uint32_t kUndefined = 0xffffffff;
 constexpr int kMaxDepth = 32;  // of sequences in one another
 
@@ -68,11 +61,11 @@ bool for_items(const DicomSet& set, bool delimited, int depth, std::size_t& at, 
         if (set.bytes.size() - at < 8) return false;
         const DicomTag tag = tag_at(set, at);
         const std::uint32_t length = number_at(set, at + 4, 4);
-        if (tag == kSequenceEnd) {
+        if (tag == kTagSequenceEnd) {
             at += 8;
             return true;
         }
-        if (tag != kItem) return false;
+        if (tag != kTagItem) return false;
         at += 8;
         DicomSet item = set;
         if (length != kUndefined) {
@@ -83,7 +76,7 @@ bool for_items(const DicomSet& set, bool delimited, int depth, std::size_t& at, 
             const std::size_t begin = at;
             Element element;
             while (at < set.bytes.size() && set.bytes.size() - at >= 8 &&
-                   tag_at(set, at) != kItemEnd) {
+                   tag_at(set, at) != kTagItemEnd) {
                 if (read_element(set, at, depth + 1, element) != Found::element) return false;
                 at = element.next;
             }
@@ -123,7 +116,7 @@ Found read_element(const DicomSet& set, std::size_t at, int depth, Element& elem
         element.unknown = kind == "UN";
     }
     element.undefined = length == kUndefined;
-    if (element.tag == kPixels && depth == 0) {  // what follows is not read here
+    if (element.tag == kTagPixels && depth == 0) {  // what follows is not read here
         element.value = set.bytes.substr(begin, 0);
         element.next = element.undefined ? 0 : begin + length;
         return Found::element;
@@ -155,7 +148,7 @@ bool is_whole(const DicomSet& set, int depth, std::size_t& end, bool& pixels) {
             case Found::damaged: return false;
             case Found::element: break;
         }
-        if (element.tag == kPixels && depth == 0) {
+        if (element.tag == kTagPixels && depth == 0) {
             pixels = true;
             return true;
         }
@@ -197,8 +190,8 @@ Read read_header_in(DicomHeader& header) {
         Element element;
         while (all.size() - at >= 8 && number_at(meta, at, 2) == 2) {
             if (read_element(meta, at, 1, element) != Found::element) return failed;
-            if (element.tag == kSyntax)
-                header.transfer_syntax = text_of({all.substr(at, element.next - at)}, kSyntax);
+            if (element.tag == kTagSyntax)
+                header.transfer_syntax = text_of({all.substr(at, element.next - at)}, kTagSyntax);
             at = element.next;
         }
         if (all.size() - at < 8) return failed;
@@ -283,34 +276,35 @@ bool numbers_of(const DicomSet& set,
 
 void read_measures(const DicomSet& set, DicomFrame& frame) {
     double spacing[2];
-    if (numbers_of(set, kPixelSpacing, "PixelSpacing", spacing, 2, frame.fault)) {
+    if (numbers_of(set, kTagPixelSpacing, "PixelSpacing", spacing, 2, frame.fault)) {
         frame.row_spacing_mm = spacing[0];
         frame.column_spacing_mm = spacing[1];
         if (!(spacing[0] > 0 && spacing[1] > 0) && frame.fault.empty())
-            frame.fault = "PixelSpacing is '" + text_of(set, kPixelSpacing) + "', and not positive";
+            frame.fault =
+                "PixelSpacing is '" + text_of(set, kTagPixelSpacing) + "', and not positive";
     }
-    numbers_of(set, kThickness, "SliceThickness", &frame.thickness_mm, 1, frame.fault);
-    numbers_of(set, kBetween, "SpacingBetweenSlices", &frame.between_mm, 1, frame.fault);
+    numbers_of(set, kTagThickness, "SliceThickness", &frame.thickness_mm, 1, frame.fault);
+    numbers_of(set, kTagBetween, "SpacingBetweenSlices", &frame.between_mm, 1, frame.fault);
     frame.between_mm = std::abs(frame.between_mm);  // negative in some objects of nuclear medicine
 }
 
 void read_position(const DicomSet& set, DicomFrame& frame) {
     double at[3];
-    if (!numbers_of(set, kPosition, "ImagePositionPatient", at, 3, frame.fault)) return;
+    if (!numbers_of(set, kTagPosition, "ImagePositionPatient", at, 3, frame.fault)) return;
     frame.position = {at[0], at[1], at[2]};
     frame.has_position = true;
 }
 
 void read_orientation(const DicomSet& set, DicomFrame& frame) {
     double along[6];
-    if (!numbers_of(set, kOrientation, "ImageOrientationPatient", along, 6, frame.fault)) return;
+    if (!numbers_of(set, kTagOrientation, "ImageOrientationPatient", along, 6, frame.fault)) return;
     frame.along_rows = {along[0], along[1], along[2]};
     frame.along_columns = {along[3], along[4], along[5]};
     const double rows = norm(frame.along_rows), columns = norm(frame.along_columns);
     if (!(std::abs(rows - 1) < 0.01 && std::abs(columns - 1) < 0.01 &&
           std::abs(dot(frame.along_rows, frame.along_columns)) < 0.01)) {
         if (frame.fault.empty())
-            frame.fault = "ImageOrientationPatient is '" + text_of(set, kOrientation) +
+            frame.fault = "ImageOrientationPatient is '" + text_of(set, kTagOrientation) +
                           "', and not two unit vectors at right angles";
         return;
     }
@@ -328,11 +322,11 @@ void read_group(const DicomSet& group, DicomFrame& frame) {
         const std::vector<DicomSet> items = items_of(group, tag);
         if (!items.empty()) read(items.front(), frame);
     };
-    with(kPixelMeasures, read_measures);
-    with(kPlanePosition, read_position);
-    with(kPlaneOrientation, read_orientation);
-    with(kSegmentIdentification, [](const DicomSet& set, DicomFrame& to) {
-        to.segment = short_of(set, kReferencedSegment);
+    with(kTagPixelMeasures, read_measures);
+    with(kTagPlanePosition, read_position);
+    with(kTagPlaneOrientation, read_orientation);
+    with(kTagSegmentIdentification, [](const DicomSet& set, DicomFrame& to) {
+        to.segment = short_of(set, kTagReferencedSegment);
     });
 }
 
@@ -485,7 +479,8 @@ std::vector<DicomFrame> frames_of(const DicomSet& set, int frames) {
     read_measures(set, common);
     read_orientation(set, common);
     read_position(set, own);
-    const std::vector<DicomSet> shared = items_of(set, kShared), each = items_of(set, kPerFrame);
+    const std::vector<DicomSet> shared = items_of(set, kTagShared),
+                                each = items_of(set, kTagPerFrame);
     if (!shared.empty()) read_group(shared.front(), common);
     std::vector<DicomFrame> result(static_cast<std::size_t>(frames), common);
     for (std::size_t n = 0; n < std::min(result.size(), each.size()); ++n)

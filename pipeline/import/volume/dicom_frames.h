@@ -19,6 +19,35 @@ namespace sonocase::pipeline::inline import_volume {
 
 // Group and element number: 0x00280010 is Rows.
 using DicomTag = std::uint32_t;
+inline constexpr DicomTag kTagSyntax = 0x00020010, kTagCharacterSet = 0x00080005,
+                          kTagImageType = 0x00080008, kTagSopClass = 0x00080016,
+                          kTagModality = 0x00080060, kTagCode = 0x00080100, kTagScheme = 0x00080102,
+                          kTagMeaning = 0x00080104, kTagDescription = 0x0008103e,
+                          kTagReferencedSeries = 0x00081115, kTagRegion = 0x00082218,
+                          kTagRegionModifier = 0x00082220, kTagPatient = 0x00100020,
+                          kTagThickness = 0x00180050, kTagBetween = 0x00180088,
+                          kTagSeries = 0x0020000e, kTagAcquisition = 0x00200012,
+                          kTagNumber = 0x00200013, kTagPosition = 0x00200032,
+                          kTagOrientation = 0x00200037, kTagFrameOfReference = 0x00200052,
+                          kTagInAcquisition = 0x00201002, kTagInSeries = 0x00201209,
+                          kTagPlanePosition = 0x00209113, kTagPlaneOrientation = 0x00209116,
+                          kTagOrganization = 0x00209311, kTagSamples = 0x00280002,
+                          kTagFrames = 0x00280008, kTagRows = 0x00280010, kTagColumns = 0x00280011,
+                          kTagPixelSpacing = 0x00280030, kTagBits = 0x00280100,
+                          kTagStored = 0x00280101, kTagHighBit = 0x00280102,
+                          kTagSigned = 0x00280103, kTagPadding = 0x00280120,
+                          kTagIntercept = 0x00281052, kTagSlope = 0x00281053,
+                          kTagLossy = 0x00282110, kTagPixelMeasures = 0x00289110,
+                          kTagTransformation = 0x00289145, kTagSlices = 0x00540081,
+                          kTagType = 0x00620001, kTagSegments = 0x00620002,
+                          kTagSegmentNumber = 0x00620004, kTagLabel = 0x00620005,
+                          kTagSegmentIdentification = 0x0062000a,
+                          kTagReferencedSegment = 0x0062000b, kTagColour = 0x0062000d,
+                          kTagMaximum = 0x0062000e, kTagPropertyType = 0x0062000f,
+                          kTagFractionalType = 0x00620010, kTagTypeModifier = 0x00620011,
+                          kTagShared = 0x52009229, kTagPerFrame = 0x52009230,
+                          kTagPixels = 0x7fe00010, kTagItem = 0xfffee000, kTagItemEnd = 0xfffee00d,
+                          kTagSequenceEnd = 0xfffee0dd;
 
 // Elements one after another, as they lie in a file.
 struct DicomSet {

@@ -23,16 +23,6 @@
 namespace sonocase::pipeline::inline import_volume {
 namespace {
 
-constexpr DicomTag kCharacterSet = 0x00080005, kSopClass = 0x00080016, kCode = 0x00080100,
-                   kScheme = 0x00080102, kMeaning = 0x00080104, kOrganization = 0x00209311,
-                   kSamples = 0x00280002, kFrames = 0x00280008, kRows = 0x00280010,
-                   kColumns = 0x00280011, kBits = 0x00280100, kPadding = 0x00280120,
-                   kType = 0x00620001, kSegments = 0x00620002, kSegmentNumber = 0x00620004,
-                   kLabel = 0x00620005, kColour = 0x0062000d, kMaximum = 0x0062000e,
-                   kPropertyType = 0x0062000f, kFractionalType = 0x00620010,
-                   kTypeModifier = 0x00620011, kRegion = 0x00082218, kRegionModifier = 0x00082220,
-                   kPerFrame = 0x52009230;
-
 constexpr const char* kAgain = "write the segmentation again";
 constexpr const char* kUnpack = "unpack it first: dcmdrle, dcmdjpeg or dcmdjpls of DCMTK";
 
@@ -91,7 +81,7 @@ bool says_nothing(const std::string& label) {
 
 // PCS-values of 16 bits to sRGB (ICC profile connection space, D50), as text from 0 to 1.
 std::string rgb_of_lab(const DicomSet& set) {
-    const std::vector<std::uint16_t> lab = shorts_of(set, kColour);
+    const std::vector<std::uint16_t> lab = shorts_of(set, kTagColour);
     if (lab.size() < 3) return "";
     const double l = lab[0] * 100.0 / 65535, a = lab[1] * 255.0 / 65535 - 128,
                  b = lab[2] * 255.0 / 65535 - 128;
@@ -113,7 +103,7 @@ std::string rgb_of_lab(const DicomSet& set) {
 }
 
 Result<std::vector<Segment>> segments_of(const DicomSet& set, const std::string& path) {
-    const std::string characters = text_of(set, kCharacterSet);
+    const std::string characters = text_of(set, kTagCharacterSet);
     const auto words = [&](const DicomSet& of, DicomTag tag) {
         std::string result = utf8(text_of(of, tag), characters);
         for (char& c : result)
@@ -121,24 +111,25 @@ Result<std::vector<Segment>> segments_of(const DicomSet& set, const std::string&
         return result;
     };
     std::vector<Segment> segments;
-    for (const DicomSet& item : items_of(set, kSegments)) {
+    for (const DicomSet& item : items_of(set, kTagSegments)) {
         Segment segment;
-        segment.number = short_of(item, kSegmentNumber);
-        segment.name = words(item, kLabel);
+        segment.number = short_of(item, kTagSegmentNumber);
+        segment.name = words(item, kTagLabel);
         segment.colour = rgb_of_lab(item);
         std::string meaning;
-        if (const auto types = items_of(item, kPropertyType); !types.empty()) {
+        if (const auto types = items_of(item, kTagPropertyType); !types.empty()) {
             const DicomSet& type = types.front();
-            meaning = words(type, kMeaning);
-            segment.code = meaning + " (" + words(type, kScheme) + " " + words(type, kCode) + ")";
-            if (const auto sides = items_of(type, kTypeModifier); !sides.empty())
-                segment.modifier = words(sides.front(), kMeaning);
+            meaning = words(type, kTagMeaning);
+            segment.code =
+                meaning + " (" + words(type, kTagScheme) + " " + words(type, kTagCode) + ")";
+            if (const auto sides = items_of(type, kTagTypeModifier); !sides.empty())
+                segment.modifier = words(sides.front(), kTagMeaning);
         }
         // Older writers give the side with the region of the body.
-        if (const auto regions = items_of(item, kRegion);
+        if (const auto regions = items_of(item, kTagRegion);
             segment.modifier.empty() && !regions.empty())
-            if (const auto sides = items_of(regions.front(), kRegionModifier); !sides.empty())
-                segment.modifier = words(sides.front(), kMeaning);
+            if (const auto sides = items_of(regions.front(), kTagRegionModifier); !sides.empty())
+                segment.modifier = words(sides.front(), kTagMeaning);
         if (says_nothing(segment.name) && !meaning.empty())
             segment.name = segment.modifier.empty() ? meaning : meaning + " " + segment.modifier;
         if (segment.name.empty()) segment.name = "segment_" + std::to_string(segment.number);
@@ -195,20 +186,20 @@ Status read_header(const std::string& path, Object& object) {
                      "copy it or export it again"};
     object.header = *std::move(header);
     const DicomSet& set = object.set();
-    if (text_of(set, kSopClass) == "1.2.840.10008.5.1.4.1.1.66.5")
+    if (text_of(set, kTagSopClass) == "1.2.840.10008.5.1.4.1.1.66.5")
         return Error{"a DICOM surface segmentation: triangles, not voxels", path,
                      "export its surfaces as STL or PLY, and give those as organ meshes"};
-    const std::string type = text_of(set, kType);
+    const std::string type = text_of(set, kTagType);
     if (type != "BINARY" && type != "FRACTIONAL" && type != "LABELMAP")
         return Error{"a DICOM segmentation of an unknown type", path,
                      "expected BINARY, FRACTIONAL or LABELMAP"};
     object.kind = type == "BINARY"       ? Kind::binary
                   : type == "FRACTIONAL" ? Kind::fractional
                                          : Kind::labelmap;
-    object.rows = short_of(set, kRows);
-    object.columns = short_of(set, kColumns);
-    object.bits = short_of(set, kBits);
-    const int frames = whole_of(set, kFrames);
+    object.rows = short_of(set, kTagRows);
+    object.columns = short_of(set, kTagColumns);
+    object.bits = short_of(set, kTagBits);
+    const int frames = whole_of(set, kTagFrames);
     if (object.rows < 1 || object.columns < 1 || frames < 1)
         return Error{text("a DICOM segmentation of %d x %d pixels and %d frames", object.columns,
                           object.rows, frames),
@@ -216,12 +207,12 @@ Status read_header(const std::string& path, Object& object) {
     const bool bits_fit = object.kind == Kind::binary       ? object.bits == 1 || object.bits == 8
                           : object.kind == Kind::fractional ? object.bits == 8
                                                             : object.bits == 8 || object.bits == 16;
-    if (!bits_fit || short_of(set, kSamples) > 1)
+    if (!bits_fit || short_of(set, kTagSamples) > 1)
         return Error{text("a DICOM segmentation (%s) of %d bits", type.c_str(), object.bits), path,
                      "expected 1 bit (BINARY), 8 (FRACTIONAL), 8 or 16 (LABELMAP)"};
-    const std::size_t given = items_of(set, kPerFrame).size();
+    const std::size_t given = items_of(set, kTagPerFrame).size();
     if (given != static_cast<std::size_t>(frames) && !(frames == 1 && given == 0)) {
-        if (text_of(set, kOrganization) == "TILED_FULL")
+        if (text_of(set, kTagOrganization) == "TILED_FULL")
             return Error{"a DICOM segmentation of a microscope slide", path,
                          "expected that of a CT or MR"};
         return Error{text("a DICOM segmentation of %d frames that places %zu", frames, given), path,
@@ -584,7 +575,7 @@ void paint_labelmap(const Object& object,
                     NativeVolume& volume,
                     std::map<int, std::uint64_t>& counts) {
     // The value of the background is 0, or another one that the header names.
-    const int padding = short_of(object.set(), kPadding);
+    const int padding = short_of(object.set(), kTagPadding);
     T* voxels = reinterpret_cast<T*>(volume.bytes.data());
     std::uint64_t twice = 0;
     for (std::size_t frame = 0; frame < object.frames.size(); ++frame) {
@@ -731,9 +722,9 @@ Result<NativeVolume> read_object(const std::string& path,
             paint_labelmap<std::uint16_t, std::uint16_t>(object, where, pixels, volume, counts);
         name_values(counts, object.segments, volume.warnings);
     } else {
-        int maximum = short_of(object.set(), kMaximum);
+        int maximum = short_of(object.set(), kTagMaximum);
         if (object.kind == Kind::fractional) {
-            const std::string type = text_of(object.set(), kFractionalType);
+            const std::string type = text_of(object.set(), kTagFractionalType);
             if (maximum < 1 || maximum > 255) {
                 volume.warnings.push_back(
                     "the FRACTIONAL segmentation names no MaximumFractionalValue: 255 was taken");

@@ -32,33 +32,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr DicomTag kImageType = 0x00080008, kSopClass = 0x00080016, kModality = 0x00080060,
-                   kPatient = 0x00100020, kDescription = 0x0008103e, kReferencedSeries = 0x00081115,
-                   kSeries = 0x0020000e, kAcquisition = 0x00200012, kNumber = 0x00200013,
-                   kFrameOfReference = 0x00200052, kInAcquisition = 0x00201002,
-                   kInSeries = 0x00201209, kSamples = 0x00280002, kFrames = 0x00280008,
-                   kRows = 0x00280010, kColumns = 0x00280011, kBits = 0x00280100,
-                   kStored = 0x00280101, kHighBit = 0x00280102, kSigned = 0x00280103,
-                   kIntercept = 0x00281052, kSlope = 0x00281053, kLossy = 0x00282110,
-                   kTransformation = 0x00289145, kShared = 0x52009229, kPerFrame = 0x52009230,
-                   kSlices = 0x00540081;
-
 DicomSlice slice_of(const DicomSet& set) {
     DicomSlice slice;
-    slice.series = text_of(set, kSeries);
-    slice.acquisition = text_of(set, kAcquisition);
-    slice.modality = text_of(set, kModality);
-    slice.description = text_of(set, kDescription);
-    slice.frame_of_reference = text_of(set, kFrameOfReference);
-    slice.patient = text_of(set, kPatient);
-    slice.rows = short_of(set, kRows);
-    slice.columns = short_of(set, kColumns);
-    slice.frames = frames_of(set, std::max(1, whole_of(set, kFrames)));
-    slice.number = whole_of(set, kNumber);
-    slice.declared = whole_of(set, kInSeries);
-    if (slice.declared == 0) slice.declared = short_of(set, kSlices);
+    slice.series = text_of(set, kTagSeries);
+    slice.acquisition = text_of(set, kTagAcquisition);
+    slice.modality = text_of(set, kTagModality);
+    slice.description = text_of(set, kTagDescription);
+    slice.frame_of_reference = text_of(set, kTagFrameOfReference);
+    slice.patient = text_of(set, kTagPatient);
+    slice.rows = short_of(set, kTagRows);
+    slice.columns = short_of(set, kTagColumns);
+    slice.frames = frames_of(set, std::max(1, whole_of(set, kTagFrames)));
+    slice.number = whole_of(set, kTagNumber);
+    slice.declared = whole_of(set, kTagInSeries);
+    if (slice.declared == 0) slice.declared = short_of(set, kTagSlices);
     if (slice.declared == 0) {
-        slice.declared = whole_of(set, kInAcquisition);
+        slice.declared = whole_of(set, kTagInAcquisition);
         slice.declared_for_acquisition = true;
     }
     return slice;
@@ -70,8 +59,8 @@ bool is_cut_off(const DicomHeader& header) {
         return static_cast<std::uint64_t>(std::max(1, short_of(header.set, tag)));
     };
     const std::uint64_t bits =
-        count(kRows) * count(kColumns) * count(kSamples) * count(kBits) *
-        static_cast<std::uint64_t>(std::max(1, whole_of(header.set, kFrames)));
+        count(kTagRows) * count(kTagColumns) * count(kTagSamples) * count(kTagBits) *
+        static_cast<std::uint64_t>(std::max(1, whole_of(header.set, kTagFrames)));
     return !header.has_pixels || header.cut_off((bits + 7) / 8);
 }
 
@@ -82,11 +71,11 @@ bool is_one_of(const std::string& text, std::initializer_list<const char*> texts
 DicomObject object_of(const DicomSet& set, const std::string& path) {
     DicomObject object;
     object.path = path;
-    object.modality = text_of(set, kModality);
-    object.frame_of_reference = text_of(set, kFrameOfReference);
-    object.patient = text_of(set, kPatient);
-    const std::vector<DicomSet> series = items_of(set, kReferencedSeries);
-    if (!series.empty()) object.series = text_of(series.front(), kSeries);
+    object.modality = text_of(set, kTagModality);
+    object.frame_of_reference = text_of(set, kTagFrameOfReference);
+    object.patient = text_of(set, kTagPatient);
+    const std::vector<DicomSet> series = items_of(set, kTagReferencedSeries);
+    if (!series.empty()) object.series = text_of(series.front(), kTagSeries);
     return object;
 }
 
@@ -94,28 +83,28 @@ DicomPixels pixels_of(const DicomHeader& header) {
     const DicomSet& set = header.set;
     DicomPixels pixels;
     pixels.at = header.pixels_at;
-    pixels.bits = short_of(set, kBits);
-    pixels.stored = short_of(set, kStored);
-    pixels.is_signed = short_of(set, kSigned) == 1;
+    pixels.bits = short_of(set, kTagBits);
+    pixels.stored = short_of(set, kTagStored);
+    pixels.is_signed = short_of(set, kTagSigned) == 1;
     bool rescaled_by_frame = false;
-    for (const DicomTag tag : {kShared, kPerFrame})
+    for (const DicomTag tag : {kTagShared, kTagPerFrame})
         if (const auto groups = items_of(set, tag); !groups.empty())
             rescaled_by_frame =
-                rescaled_by_frame || !items_of(groups.front(), kTransformation).empty();
+                rescaled_by_frame || !items_of(groups.front(), kTagTransformation).empty();
     bool numbers = true;
     for (const auto& [tag, value] :
-         {std::pair{kSlope, &pixels.slope}, std::pair{kIntercept, &pixels.intercept}})
+         {std::pair{kTagSlope, &pixels.slope}, std::pair{kTagIntercept, &pixels.intercept}})
         if (const std::string text = text_of(set, tag); !text.empty())
             numbers = numbers && parse_number(text, *value) && std::isfinite(*value);
     // JPEG of the first two processes knows no other way.
     pixels.lossy =
-        text_of(set, kLossy) == "01" ||
+        text_of(set, kTagLossy) == "01" ||
         is_one_of(header.transfer_syntax, {"1.2.840.10008.1.2.4.50", "1.2.840.10008.1.2.4.51"});
     pixels.run_lengths = header.packed && header.transfer_syntax == "1.2.840.10008.1.2.5";
     pixels.sound = (pixels.bits == 8 || pixels.bits == 16 || pixels.bits == 32) &&
                    pixels.stored >= 1 && pixels.stored <= pixels.bits &&
-                   short_of(set, kHighBit) == pixels.stored - 1 && short_of(set, kSamples) <= 1 &&
-                   short_of(set, kSigned) <= 1 && numbers;
+                   short_of(set, kTagHighBit) == pixels.stored - 1 &&
+                   short_of(set, kTagSamples) <= 1 && short_of(set, kTagSigned) <= 1 && numbers;
     pixels.plain = pixels.sound && pixels.bits <= 16 && header.packed == pixels.run_lengths &&
                    !header.inflated && !set.big_endian && !rescaled_by_frame;
     return pixels;
@@ -129,7 +118,7 @@ void add_file(const std::string& path, DicomFolder& folder) {
         return;
     }
     const DicomSet& set = header->set;
-    const std::string type = text_of(set, kSopClass);
+    const std::string type = text_of(set, kTagSopClass);
     DicomObject object = object_of(set, path);
     if (type.starts_with("1.2.840.10008.5.1.4.1.1.66.") || object.modality == "SEG") {
         object.cut_off = is_cut_off(*header);
@@ -140,12 +129,12 @@ void add_file(const std::string& path, DicomFolder& folder) {
         folder.structure_sets.push_back(std::move(object));
         return;
     }
-    const bool has_pixels = short_of(set, kRows) > 0 && short_of(set, kColumns) > 0;
+    const bool has_pixels = short_of(set, kTagRows) > 0 && short_of(set, kTagColumns) > 0;
     if (!has_pixels && is_one_of(object.modality, {"CT", "MR"})) {
         folder.damaged.push_back(path);
         return;
     }
-    const bool localizer = text_of(set, kImageType).find("LOCALIZER") != std::string::npos;
+    const bool localizer = text_of(set, kTagImageType).find("LOCALIZER") != std::string::npos;
     if (!has_pixels || localizer ||
         is_one_of(object.modality, {"PT", "NM", "RTDOSE", "RTIMAGE", "US", "XA", "CR", "DX"})) {
         if (localizer) object.modality += " localizer";
@@ -229,7 +218,7 @@ std::string objects_text(const std::vector<DicomObject>& objects) {
 
 namespace {
 
-constexpr const char* kExpected =
+constexpr const char* kSliceExpected =
     "expected one complete series of CT-like slices; export the series again";
 constexpr double kMaxShift = 0.05;   // of the spacing, off even places
 constexpr double kSameSlice = 0.01;  // of the spacing: two slices in one place
@@ -255,21 +244,22 @@ Status check_places(const std::vector<DicomSlice>& slices) {
     for (const DicomSlice& slice : slices) {
         const DicomFrame& place = slice.place();
         const std::string of = slice.of_frame > 0 ? name_of(slice) + ": " : "";
-        if (!place.fault.empty()) return Error{of + place.fault, slice.path, kExpected};
+        if (!place.fault.empty()) return Error{of + place.fault, slice.path, kSliceExpected};
         if (!place.placed())
-            return Error{of + "slice does not say where it lies", slice.path, kExpected};
+            return Error{of + "slice does not say where it lies", slice.path, kSliceExpected};
         if (!(place.row_spacing_mm > 0))
-            return Error{of + "slice does not say how large its pixels are", slice.path, kExpected};
+            return Error{of + "slice does not say how large its pixels are", slice.path,
+                         kSliceExpected};
         if (norm(place.along_rows - first.along_rows) > 1e-3 ||
             norm(place.along_columns - first.along_columns) > 1e-3)
             return Error{of + "slice is turned against " + name_of(slices.front()), slice.path,
-                         kExpected};
+                         kSliceExpected};
         if (std::abs(place.row_spacing_mm / first.row_spacing_mm - 1) > 1e-3 ||
             std::abs(place.column_spacing_mm / first.column_spacing_mm - 1) > 1e-3)
             return Error{of + text("pixels of %.4g x %.4g mm among slices of %.4g x %.4g mm",
                                    place.column_spacing_mm, place.row_spacing_mm,
                                    first.column_spacing_mm, first.row_spacing_mm),
-                         slice.path, kExpected};
+                         slice.path, kSliceExpected};
     }
     return Done{};
 }
@@ -306,7 +296,7 @@ Status check_spacing(const std::vector<DicomSlice>& slices,
         const DicomSlice &before = slices[n], &after = slices[n + 1];
         if (!(gaps[n] > kSameSlice * step))
             return Error{"slice is there twice, in " + name_of(before) + " as well", after.path,
-                         kExpected};
+                         kSliceExpected};
         if (gaps[n] < 1.5 * step) continue;
         const long missing = std::max(1L, std::lround(gaps[n] / step) - 1);
         return Error{text("%ld slice%s missing between %s and %s, %.4g mm apart where others are "
@@ -314,7 +304,7 @@ Status check_spacing(const std::vector<DicomSlice>& slices,
                           missing, missing == 1 ? " is" : "s are", name_of(before).c_str(),
                           name_of(after).c_str(), gaps[n], step) +
                          stray_between(others, before, after, normal),
-                     after.path, kExpected};
+                     after.path, kSliceExpected};
     }
     // Even places lie on the line from the first slice to the last.
     const double count = static_cast<double>(gaps.size());
@@ -326,7 +316,7 @@ Status check_spacing(const std::vector<DicomSlice>& slices,
         if (off > kMaxShift * norm(even))
             return Error{
                 text("slices are unevenly spaced: this one lies %.3g mm off its place", off),
-                slices[n].path, kExpected};
+                slices[n].path, kSliceExpected};
     }
     return Done{};
 }
@@ -342,7 +332,7 @@ Status check_declared(const std::vector<DicomSlice>& slices) {
             return Error{text("header says that there are %d slices, and there are %d: those at an "
                               "end are missing",
                               slice.declared, found),
-                         slice.path, kExpected};
+                         slice.path, kSliceExpected};
     }
     return Done{};
 }
@@ -391,7 +381,7 @@ Status split_frames(DicomStack& stack) {
         const double step = first.between_mm > 0 ? first.between_mm : first.thickness_mm;
         if (!(step > 0))
             return Error{"says where the first of its frames lies, and not how far apart they are",
-                         whole.path, kExpected};
+                         whole.path, kSliceExpected};
         for (std::size_t n = 1; n < frames.size(); ++n) {
             frames[n].position = first.position + static_cast<double>(n) * step * first.normal();
             frames[n].has_position = true;
@@ -507,7 +497,8 @@ Result<Grid> grid_of(const DicomStack& stack, const std::string& path, NativeVol
     const double height = dot(last.position - first.position, first.normal());
     double step = count > 1 ? height / (count - 1) : first.thickness_mm;
     if (!(step > 0)) step = first.between_mm;
-    if (!(step > 0)) return Error{"one slice that does not say how thick it is", path, kExpected};
+    if (!(step > 0))
+        return Error{"one slice that does not say how thick it is", path, kSliceExpected};
     const Vector3 slide = slide_of(stack);
     const double off = norm(slide);
     const double voxel = std::min({first.row_spacing_mm, first.column_spacing_mm, step});
@@ -588,9 +579,10 @@ void unshear(const DicomStack& stack, NativeVolume& volume) {
 Status append_slice(const DicomSlice& slice, itk::GDCMImageIO& io, NativeVolume& volume) {
     const auto component = component_called(io.GetComponentTypeAsString(io.GetComponentType()));
     if (!component || io.GetNumberOfComponents() != 1)
-        return Error{"pixels that are not one whole number each", slice.path, kExpected};
+        return Error{"pixels that are not one whole number each", slice.path, kSliceExpected};
     if (!volume.bytes.empty() && *component != volume.component)
-        return Error{"pixels of another type than in the slices before", slice.path, kExpected};
+        return Error{"pixels of another type than in the slices before", slice.path,
+                     kSliceExpected};
     const auto bytes = static_cast<std::size_t>(io.GetImageSizeInBytes());
     const std::size_t at = volume.bytes.size();
     volume.component = *component;
@@ -694,7 +686,7 @@ Result<NativeVolume> read_stack(const DicomStack& stack,
     for (const DicomSlice& slice : stack.slices) {
         if (one_file && &slice != &first) break;
         if (!slice.pixels.sound)
-            return Error{"pixels that are not one whole number each", slice.path, kExpected};
+            return Error{"pixels that are not one whole number each", slice.path, kSliceExpected};
         try {
             const auto io = itk::GDCMImageIO::New();
             io->SetFileName(slice.path);
@@ -706,7 +698,7 @@ Result<NativeVolume> read_stack(const DicomStack& stack,
                 frames != (one_file ? stack.slices.size() : 1))
                 return Error{"slice of " + size_text(*io) + " where its header says " +
                                  std::to_string(slice.columns) + " x " + std::to_string(slice.rows),
-                             slice.path, kExpected};
+                             slice.path, kSliceExpected};
             if (volume.bytes.empty() && !one_file)
                 volume.bytes.reserve(stack.slices.size() *
                                      static_cast<std::size_t>(io->GetImageSizeInBytes()));

@@ -19,7 +19,7 @@ namespace sonocase::pipeline::inline import_volume {
 
 namespace {
 
-constexpr const char* kAgain = "export the volume again";
+constexpr const char* kExportAgain = "export the volume again";
 constexpr const char* kCutOff = "the file is cut off or damaged; copy or export it again";
 
 // Where the fields of a header are, and numbers of either byte order.
@@ -75,7 +75,7 @@ std::optional<Component> component_of_datatype(int datatype) {
 }
 
 Error not_finite(const std::string& field, const std::string& path) {
-    return {"geometry in the header is not a number (" + field + ")", path, kAgain};
+    return {"geometry in the header is not a number (" + field + ")", path, kExportAgain};
 }
 
 // One of the two transforms that a header may hold, in units of the file.
@@ -125,7 +125,7 @@ Result<Transform> read_qform(Fields& fields,
         return Error{text("the header's quaternion is of length %.3g, and no rotation (quatern_b, "
                           "quatern_c, quatern_d)",
                           std::sqrt(length)),
-                     path, kAgain};
+                     path, kExportAgain};
     const Quaternion turn{std::sqrt(std::max(0.0, 1 - length)), q[0], q[1], q[2]};
     t.columns = rotation_from_quaternion(turn);
     for (int axis = 0; axis < 3; ++axis) {
@@ -176,7 +176,7 @@ Status read_sizes(Fields& fields, NiftiHeader& header, const std::string& path) 
     header.dim[0] = count;
     if (count < 1 || count > 7)
         return Error{"header says that there are " + std::to_string(count) + " dimensions (dim)",
-                     path, "expected three; " + std::string(kAgain)};
+                     path, "expected three; " + std::string(kExportAgain)};
     if (count < 3)
         return Error{"an image of " + sizes + " pixels", path,
                      "expected a volume of three dimensions"};
@@ -286,7 +286,7 @@ Status read_placement(Fields& fields,
         if (is_flat(sform->columns)) {
             if (orientation == Orientation::sform || !has_qform)
                 return Error{"the sform of the header spans no volume (srow_x, srow_y, srow_z)",
-                             path, kAgain};
+                             path, kExportAgain};
             warnings.push_back(
                 "the sform of the header spans no volume (srow_x, srow_y, srow_z) and is left "
                 "out: the qform is taken");
@@ -304,7 +304,8 @@ Status read_placement(Fields& fields,
         }
     }
     if (!sform && !bad_pixdim.empty())
-        return Error{bad_pixdim, path, "expected a voxel size above 0 mm; " + std::string(kAgain)};
+        return Error{bad_pixdim, path,
+                     "expected a voxel size above 0 mm; " + std::string(kExportAgain)};
     if (sform && !bad_pixdim.empty())
         warnings.push_back(bad_pixdim + ": voxel sizes are those of the sform");
 
@@ -446,7 +447,7 @@ Result<NiftiHeader> parse_nifti_header(std::span<const std::uint8_t> bytes,
         header.voxels_at = offset < 2e9 ? static_cast<std::int64_t>(std::max(offset, 0.0)) : -1;
     }
     if (header.voxels_at < 0 || header.voxels_at > (std::int64_t{1} << 40))
-        return Error{"header puts the voxels nowhere (vox_offset)", path, kAgain};
+        return Error{"header puts the voxels nowhere (vox_offset)", path, kExportAgain};
     header.voxels_at = std::max(header.voxels_at, header.bytes + 4);
     SONOCASE_TRY_DONE(read_scale(fields, header, path));
     SONOCASE_TRY_DONE(read_placement(fields, header, path, orientation));

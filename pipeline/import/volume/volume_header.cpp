@@ -27,7 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kMaxHeaderLines = 1000;
-constexpr const char* kExpected = "expected a file with the voxels";
+constexpr const char* kVoxelsExpected = "expected a file with the voxels";
 
 bool names_many_files(const std::string& data_file) {
     return data_file.find('%') != std::string::npos || lower_case(data_file).starts_with("list");
@@ -121,7 +121,7 @@ Result<std::vector<std::string>> listed_files(const std::string& path,
 
 // Every file of the list is there: the library below leaves out what is not, without a word.
 Status check_listed_files(const std::string& path, const std::string& data_file) {
-    SONOCASE_TRY_DONE(check_source_folder(folder_of(path), kExpected));
+    SONOCASE_TRY_DONE(check_source_folder(folder_of(path), kVoxelsExpected));
     SONOCASE_TRY(const auto files, listed_files(path, data_file));
     std::error_code code;
     for (const std::string& file : files)
@@ -136,7 +136,7 @@ Status check_data_file(const std::string& path, const std::string& data_path) {
     std::error_code code;
     if (!fs::exists(data_path, code))
         return Error{"its data file " + data_path + " is not there", path, "keep the two together"};
-    return check_source_file(data_path, kExpected);
+    return check_source_file(data_path, kVoxelsExpected);
 }
 
 }  // namespace
@@ -219,7 +219,7 @@ namespace {
 
 constexpr const char* kWriteAgain = "write the volume again with its geometry in the header";
 
-Error not_finite(const std::string& field, const std::string& path) {
+Error geometry_not_finite(const std::string& field, const std::string& path) {
     return {"geometry in the header is not a number (" + field + ")", path, kWriteAgain};
 }
 
@@ -246,7 +246,7 @@ Result<std::vector<double>> finite_numbers(const std::vector<std::string>& cells
     std::vector<double> numbers;
     for (const std::string& cell : cells) {
         const auto number = number_in(cell);
-        if (!number || !std::isfinite(*number)) return not_finite(field, path);
+        if (!number || !std::isfinite(*number)) return geometry_not_finite(field, path);
         numbers.push_back(*number);
     }
     if (count > 0 && numbers.size() != count)
@@ -570,7 +570,7 @@ Result<Placement> nrrd_placement(std::string_view header, const std::string& pat
                              kWriteAgain};
         SONOCASE_TRY_DONE(scale_to_mm(units[0], units_field, path, placement));
     }
-    if (!is_finite(placement)) return not_finite("axes or origin", path);
+    if (!is_finite(placement)) return geometry_not_finite("axes or origin", path);
     return placement;
 }
 
@@ -682,7 +682,7 @@ Result<Placement> meta_placement(std::string_view header, const std::string& pat
     }
     SONOCASE_TRY_DONE(
         scale_to_mm(field({"DistanceUnits"}).second, "DistanceUnits", path, placement));
-    if (!is_finite(placement)) return not_finite("axes or origin", path);
+    if (!is_finite(placement)) return geometry_not_finite("axes or origin", path);
     return placement;
 }
 

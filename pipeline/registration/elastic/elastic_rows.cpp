@@ -87,7 +87,6 @@ namespace {
 constexpr double kEdgeMm = 8;
 constexpr double kMinCosine = 0.3, kTableLossMm = 10;
 constexpr std::size_t kBlocks = 4;  // of rows, each summed by itself: fixed, whatever the threads
-constexpr Lanes kZero = {0, 0, 0, 0};
 
 Lanes lanes_of(Vector3 v) {
     return Lanes{static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), 0};
@@ -245,7 +244,7 @@ void ElasticRows::add_table_rows(const MappedSkin& mapped,
 
 void ElasticRows::project(std::span<const Lanes> along) {
     const auto at = [&](const SplineFootprint& f) {
-        Lanes sum = kZero;
+        Lanes sum = kNoLanes;
         for (std::size_t w = 0; w < 64; ++w) sum += f.weight[w] * along[f.first + offset_[w]];
         return vector_of(sum);
     };
@@ -293,12 +292,12 @@ void ElasticRows::add_curvature(std::span<const Lanes> in, std::span<Lanes> out)
     parallel_for(kBlocks, 1, [&](std::size_t first, std::size_t last) {
         for (std::size_t block = first; block < last; ++block) {
             std::vector<Lanes>& sum = sums_[block];
-            sum.assign(out.size(), kZero);
+            sum.assign(out.size(), kNoLanes);
             const std::size_t end = rows_.size() * (block + 1) / kBlocks;
             for (std::size_t n = rows_.size() * block / kBlocks; n < end; ++n) {
                 const Row& row = rows_[n];
                 const Lanes* from = in.data() + row.at.first;
-                Lanes at = kZero;
+                Lanes at = kNoLanes;
                 for (std::size_t w = 0; w < 64; ++w) at += row.at.weight[w] * from[offset_[w]];
                 const Lanes along = at * row.scaled;
                 const Lanes push = ((along[0] + along[1]) + along[2]) * row.scaled;
@@ -312,7 +311,7 @@ void ElasticRows::add_curvature(std::span<const Lanes> in, std::span<Lanes> out)
     }
     const float lm = static_cast<float>(landmark_weight_);
     for (const Mark& mark : marks_) {
-        Lanes at = kZero;
+        Lanes at = kNoLanes;
         for (std::size_t w = 0; w < 64; ++w)
             at += mark.at.weight[w] * in[mark.at.first + offset_[w]];
         for (std::size_t w = 0; w < 64; ++w)

@@ -8,7 +8,6 @@
 namespace sonocase::pipeline::inline registration_elastic {
 namespace {
 
-constexpr Lanes kZero = {0, 0, 0, 0};
 // From stiff to soft: in each round stiffness, Cauchy scale and gate change by a factor, from 30
 // times the stiffness and the first values to 1 and the last ones. The factors are the roots of the
 // ratios of order `rounds`, written out because libm's pow differs between platforms. After
@@ -68,7 +67,7 @@ class Descent {
                 input.landmarks,
                 input.landmark_weight,
                 registration->residual),
-          d_(lattice_.control_count(), kZero) {
+          d_(lattice_.control_count(), kNoLanes) {
         for (std::size_t i = 0; i < d_.size(); ++i) {
             const Vector3 c = registration->residual.control_mm[i];
             d_[i] =
@@ -129,8 +128,8 @@ class Descent {
     // Preconditioned conjugate gradients on the Gauss-Newton model.
     std::vector<Lanes> direction(const StrainOptions& options, ElasticFit* fit) {
         const std::size_t count = d_.size();
-        std::vector<Lanes> r(count, kZero), z(count), q(count), step(count, kZero),
-            diagonal(count, kZero), bent(count);
+        std::vector<Lanes> r(count, kNoLanes), z(count), q(count), step(count, kNoLanes),
+            diagonal(count, kNoLanes), bent(count);
         LatticeSlopes slopes;
         strain_.linearise(at_, options, &slopes);
         lattice_.transposed(slopes, false, r);

@@ -7,8 +7,6 @@
 namespace sonocase::pipeline::inline registration_elastic {
 namespace {
 
-constexpr Lanes kZero = {0, 0, 0, 0};
-
 std::size_t as_size(int n) {
     return static_cast<std::size_t>(n);
 }
@@ -16,9 +14,9 @@ std::size_t as_size(int n) {
 }  // namespace
 
 void LatticeSlopes::resize(std::size_t count) {
-    x.resize(count, kZero);
-    y.resize(count, kZero);
-    z.resize(count, kZero);
+    x.resize(count, kNoLanes);
+    y.resize(count, kNoLanes);
+    z.resize(count, kNoLanes);
 }
 
 SplineLattice::SplineLattice(const DisplacementGrid& grid) {
@@ -146,9 +144,9 @@ void SplineLattice::transposed(const LatticeSlopes& values,
     parallel_for(as_size(n.z), 1, [&](std::size_t begin, std::size_t end) {
         std::vector<Lanes> by_x(slab), by_y(slab), plain(slab), value(sx), slope(sx);
         for (std::size_t k = begin; k < end; ++k) {
-            by_x.assign(slab, kZero);
-            by_y.assign(slab, kZero);
-            plain.assign(slab, kZero);
+            by_x.assign(slab, kNoLanes);
+            by_y.assign(slab, kNoLanes);
+            plain.assign(slab, kNoLanes);
             for (const Tap& t : axis_[2].taps[k]) {
                 const float v = value_of(t), d = slope_of(t);
                 const std::size_t from = slab * as_size(t.sample);
@@ -159,8 +157,8 @@ void SplineLattice::transposed(const LatticeSlopes& values,
                 }
             }
             for (std::size_t j = 0; j < ny; ++j) {
-                value.assign(sx, kZero);
-                slope.assign(sx, kZero);
+                value.assign(sx, kNoLanes);
+                slope.assign(sx, kNoLanes);
                 for (const Tap& t : axis_[1].taps[j]) {
                     const float v = value_of(t), d = slope_of(t);
                     const std::size_t from = sx * as_size(t.sample);
@@ -171,7 +169,7 @@ void SplineLattice::transposed(const LatticeSlopes& values,
                 }
                 Lanes* line = out.data() + nx * (j + ny * k);
                 for (std::size_t i = 0; i < nx; ++i) {
-                    Lanes sum = kZero;
+                    Lanes sum = kNoLanes;
                     for (const Tap& t : axis_[0].taps[i]) {
                         sum += value_of(t) * value[as_size(t.sample)] +
                                slope_of(t) * slope[as_size(t.sample)];

@@ -18,6 +18,7 @@
 namespace sonocase::pipeline::inline registration_elastic {
 
 using Lanes = SplinePenalty::Lanes;  // x, y, z and one of padding
+inline constexpr Lanes kNoLanes = {0, 0, 0, 0};
 
 // d(displacement)/dx, /dy and /dz at each sample. # samples each, x fastest.
 struct LatticeSlopes {

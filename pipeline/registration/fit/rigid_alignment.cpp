@@ -26,7 +26,7 @@ constexpr double kScoreScaleMm = 10;
 constexpr double kSamePoseRad = 20 * kPi / 180, kSamePoseMm = 40;
 
 // The points of both surfaces that are matched; the skin that is searched may hold more points.
-struct Pair {
+struct SurfacePair {
     const SkinModel& skin;
     PointIndex skin_index;
     std::vector<std::uint32_t> skin_queries;
@@ -44,8 +44,8 @@ std::vector<std::uint32_t> every_nth(const std::vector<std::uint32_t>& all, int 
     return some;
 }
 
-Pair make_pair_of(const SkinModel& skin, const TargetSurface& target, int points) {
-    Pair pair{skin, PointIndex(skin.points), {}, target, {}};
+SurfacePair make_pair_of(const SkinModel& skin, const TargetSurface& target, int points) {
+    SurfacePair pair{skin, PointIndex(skin.points), {}, target, {}};
     std::vector<std::uint32_t> all;
     for (std::size_t i = 0; i < skin.points.size(); ++i) {
         if (!skin.on_rim[i]) all.push_back(static_cast<std::uint32_t>(i));
@@ -63,7 +63,7 @@ double penalty(double gap, double scale) {
 
 // The nearest point of each query at the pose before, or PointIndex::kNone.
 struct Guesses {
-    explicit Guesses(const Pair& pair)
+    explicit Guesses(const SurfacePair& pair)
         : skin(pair.target_queries.size(), PointIndex::kNone),
           target(pair.skin_queries.size(), PointIndex::kNone) {}
     std::vector<std::uint32_t> skin, target;
@@ -72,7 +72,7 @@ struct Guesses {
 // Calls row(from_target, p, n, gap) for every point with a counterpart, p on the moved skin,
 // and missing(from_target) for the others.
 template <class RowOf, class Missing>
-void for_rows(const Pair& pair,
+void for_rows(const SurfacePair& pair,
               const Rigid& pose,
               double farthest_mm,
               Guesses& guesses,
@@ -128,7 +128,7 @@ void for_rows(const Pair& pair,
 }
 
 // One robust Gauss-Newton step on the point-to-plane gaps.
-Rigid step(const Pair& pair,
+Rigid step(const SurfacePair& pair,
            const PoseHints& hints,
            const Rigid& pose,
            double scale_mm,
@@ -189,7 +189,7 @@ Rigid step(const Pair& pair,
     return {rotation, (centre + shift) - Point3{}};  // the skin's origin goes to centre + shift
 }
 
-RigidCandidate scored(const Pair& pair,
+RigidCandidate scored(const SurfacePair& pair,
                       const PoseHints& hints,
                       const Rigid& pose,
                       Guesses& guesses) {
@@ -211,7 +211,7 @@ RigidCandidate scored(const Pair& pair,
     return c;
 }
 
-RigidCandidate descend(const Pair& pair,
+RigidCandidate descend(const SurfacePair& pair,
                        const PoseHints& hints,
                        Rigid pose,
                        int iterations,
@@ -311,7 +311,7 @@ std::vector<Matrix3> spread_rotations(const RigidOptions& options, const Matrix3
 
 // The shift that moves the turned skin to the readings, using only parts that face the same way:
 // correct for a sweep of one side as well as of the whole body.
-Vector3 facing_shift(const Pair& pair, const Matrix3& rotation) {
+Vector3 facing_shift(const SurfacePair& pair, const Matrix3& rotation) {
     Vector3 sum;
     int count = 0;
     for (std::uint32_t j : pair.target_queries) {
@@ -363,7 +363,7 @@ std::vector<RigidCandidate> align_rigid_candidates(const SkinModel& skin,
                                                    const TargetSurface& target,
                                                    const RigidOptions& options,
                                                    const Progress& progress) {
-    const Pair coarse = make_pair_of(skin, target, options.coarse_points);
+    const SurfacePair coarse = make_pair_of(skin, target, options.coarse_points);
     const std::vector<Matrix3> rotations = spread_rotations(options, axes_of(target));
     const int offsets = std::max(1, options.offsets);
     std::vector<RigidCandidate> found(rotations.size() * static_cast<std::size_t>(offsets));
@@ -386,7 +386,7 @@ std::vector<RigidCandidate> align_rigid_candidates(const SkinModel& skin,
                 return same_pose(o.target_from_skin, c.target_from_skin, kSamePoseRad, kSamePoseMm);
             }));
     }
-    const Pair fine = make_pair_of(skin, target, options.fine_points);
+    const SurfacePair fine = make_pair_of(skin, target, options.fine_points);
     parallel_for(best.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t n = begin; n < end; ++n) {
             const int times = best[n].found;

@@ -14,7 +14,7 @@ namespace {
 constexpr double kSigmaPerFwhm = 1 / kFullWidthPerSigma;
 constexpr double kLayerMm = 0.18;      // typical deviation of a reflecting layer
 constexpr double kPhaseLoss = 0.75;    // measured on the rough face of bone
-constexpr double kCellMm = 0.66;       // edge of the scatterers' lattice at 3.5 MHz
+constexpr double kLatticeMm = 0.66;    // edge of the scatterers' lattice at 3.5 MHz
 constexpr double kCellPerStep = 1.25;  // the edge is at least this many samples long
 // Beams stand no farther apart than this many edges: what lies between two beams would show in
 // neither, and speckle would not follow the tissue. Where beams are fewer, the edge grows instead,
@@ -126,7 +126,7 @@ double lateral_width(
 // Edge of the scatterers' lattice: as coarse as the point spread allows, so that samples a beam
 // apart share scatterers.
 double cell_edge(double axial_fwhm, double frequency_mhz) {
-    return std::min(kCellMm * std::pow(3.5 / frequency_mhz, 0.7), axial_fwhm);
+    return std::min(kLatticeMm * std::pow(3.5 / frequency_mhz, 0.7), axial_fwhm);
 }
 
 // Width of the scanned area at its lower edge, along the arc.
