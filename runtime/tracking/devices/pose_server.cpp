@@ -16,7 +16,7 @@
 namespace sonocase::runtime::inline tracking_devices {
 namespace {
 
-constexpr std::size_t kMaxClients = 16;
+constexpr std::size_t kMaxPoseClients = 16;
 constexpr int kRequestTurns = 2000;  // of the server's loop: a few seconds to ask properly
 
 Result<std::string> random_token() {
@@ -137,8 +137,8 @@ void PoseServer::run() {
         // Those who connect without end do not hold up those who are there.
         std::size_t accepted = 0;
         for (Socket client = listener_.accept(clients.empty() ? 0.05 : 0.002); client.open();
-             client = ++accepted < kMaxClients ? listener_.accept(0) : Socket()) {
-            if (clients.size() < kMaxClients) clients.push_back({std::move(client)});
+             client = ++accepted < kMaxPoseClients ? listener_.accept(0) : Socket()) {
+            if (clients.size() < kMaxPoseClients) clients.push_back({std::move(client)});
         }
         std::string fresh;
         if (box_.refresh() && box_.value().has_probe) {
