@@ -890,7 +890,8 @@ bool ProcedureRun::tried(const Watch& w) const {
         return state_.wire_was_in;
     if (!w.taken.empty) return state_.throws > 0;
     const bool of_needle = w.complication >= 0 || w.aspirated >= 0 || !w.tip_in.empty ||
-                           c.needle_in == 1 || c.tip_in_view == 1 || c.depth_at_least_mm >= 0;
+                           c.needle_in == 1 || c.tip_in_view == 1 || c.depth_at_least_mm >= 0 ||
+                           c.drained_at_least >= 0;
     return of_needle ? state_.needle_was_in : state_.probe_was_on_skin;
 }
 

@@ -203,7 +203,7 @@ class ProcedureRun {
     // all are behind.
     int present_step() const;
     StepState step_state(int step) const;
-    // Of a `never`: also that what it guards against could have happened, since whoever inserts
+    // A `never` is ticked only where what it guards against could have happened: whoever inserts
     // nothing spares nothing.
     bool item_ticked(int item) const;
     ProcedureView view() const;  // constant time for a given procedure; allocates nothing

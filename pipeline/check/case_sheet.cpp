@@ -18,7 +18,7 @@ namespace sonocase::pipeline::inline check {
 
 namespace {
 
-constexpr int kSheetPanelPx = kSheetPx, kCaptionPx = 26, kGapPx = 10, kColumns = 4;
+constexpr int kCaptionPx = 26, kGapPx = 10, kColumns = 4;
 
 using Colour = std::array<std::uint8_t, 3>;
 
@@ -26,13 +26,12 @@ using Colour = std::array<std::uint8_t, 3>;
 struct Panel {
     std::string caption;
     std::string left, right;  // letters at its edges: the patient's sides
-    std::vector<std::uint8_t> rgb =
-        std::vector<std::uint8_t>(3 * kSheetPanelPx * kSheetPanelPx, 255);
+    std::vector<std::uint8_t> rgb = std::vector<std::uint8_t>(3 * kSheetPx * kSheetPx, 255);
 
     void plot(int x, int y, Colour colour) {
-        if (x < 0 || y < 0 || x >= kSheetPanelPx || y >= kSheetPanelPx) return;
+        if (x < 0 || y < 0 || x >= kSheetPx || y >= kSheetPx) return;
         std::copy(colour.begin(), colour.end(),
-                  rgb.begin() + 3 * (static_cast<std::ptrdiff_t>(y) * kSheetPanelPx + x));
+                  rgb.begin() + 3 * (static_cast<std::ptrdiff_t>(y) * kSheetPx + x));
     }
 };
 
@@ -43,14 +42,14 @@ struct View {
     double mm_per_px = 1;
 
     Point3 at(int x, int y) const {
-        return middle + (x - kSheetPanelPx / 2) * mm_per_px * across +
-               (y - kSheetPanelPx / 2) * mm_per_px * down;
+        return middle + (x - kSheetPx / 2) * mm_per_px * across +
+               (y - kSheetPx / 2) * mm_per_px * down;
     }
 };
 
 void draw_labels(const CaseLabels& labels, const View& view, Panel& panel) {
-    for (int y = 0; y < kSheetPanelPx; ++y)
-        for (int x = 0; x < kSheetPanelPx; ++x) {
+    for (int y = 0; y < kSheetPx; ++y)
+        for (int x = 0; x < kSheetPx; ++x) {
             const int label = labels.label(view.at(x, y));
             panel.plot(x, y,
                        label == 0 ? Colour{0, 0, 0}
@@ -63,8 +62,8 @@ void stroke(const View& view, Point3 from, Point3 to, Colour colour, Panel& pane
         const Vector3 at = from + (s / 800.0) * (to - from) - view.middle;
         const int x = static_cast<int>(std::lround(dot(at, view.across) / view.mm_per_px)),
                   y = static_cast<int>(std::lround(dot(at, view.down) / view.mm_per_px));
-        panel.plot(x + kSheetPanelPx / 2, y + kSheetPanelPx / 2, colour);
-        panel.plot(x + kSheetPanelPx / 2 + 1, y + kSheetPanelPx / 2, colour);
+        panel.plot(x + kSheetPx / 2, y + kSheetPx / 2, colour);
+        panel.plot(x + kSheetPx / 2 + 1, y + kSheetPx / 2, colour);
     }
 }
 
@@ -101,7 +100,7 @@ std::vector<Panel> planes(const CaseLabels& labels, const PatientAxes& axes) {
     double longest = 0;
     for (int axis = 0; axis < 3; ++axis)
         longest = std::max(longest, grid.size[axis] * grid.spacing_mm[axis]);
-    view.mm_per_px = longest / kSheetPanelPx;
+    view.mm_per_px = longest / kSheetPx;
     struct CutPlane {
         const char* caption;
         Vector3 across, down;
@@ -127,17 +126,15 @@ std::vector<Panel> planes(const CaseLabels& labels, const PatientAxes& axes) {
 Panel in_space(const CaseBundle& bundle, const char* caption, Vector3 along, Vector3 up) {
     std::vector<Point3> marks;
     for (const NamedTarget& target : exercise_targets(bundle)) marks.push_back(target.centre);
-    const BodyView view = body_view(bundle, along, up, marks, kSheetPanelPx);
+    const BodyView view = body_view(bundle, along, up, marks, kSheetPx);
     Panel panel;
     panel.caption = caption;
     const double scale =
-        static_cast<double>(std::max({view.width_px, view.height_px, 1})) / kSheetPanelPx;
-    for (int y = 0; y < kSheetPanelPx; ++y)
-        for (int x = 0; x < kSheetPanelPx; ++x) {
-            const int from_x =
-                          static_cast<int>((x - kSheetPanelPx / 2) * scale + view.width_px / 2.0),
-                      from_y =
-                          static_cast<int>((y - kSheetPanelPx / 2) * scale + view.height_px / 2.0);
+        static_cast<double>(std::max({view.width_px, view.height_px, 1})) / kSheetPx;
+    for (int y = 0; y < kSheetPx; ++y)
+        for (int x = 0; x < kSheetPx; ++x) {
+            const int from_x = static_cast<int>((x - kSheetPx / 2) * scale + view.width_px / 2.0),
+                      from_y = static_cast<int>((y - kSheetPx / 2) * scale + view.height_px / 2.0);
             if (from_x < 0 || from_y < 0 || from_x >= view.width_px || from_y >= view.height_px)
                 continue;
             const std::uint8_t* pixel =
@@ -153,7 +150,7 @@ Panel window(const CaseLabels& labels, const Exercise& exercise) {
     const SweepKey& start = exercise.sweeps.front().keys.front();
     View view;
     const double depth_mm = exercise.probe.depth_mm;
-    view.mm_per_px = (depth_mm + 40) / kSheetPanelPx;
+    view.mm_per_px = (depth_mm + 40) / kSheetPx;
     view.down = normalized(start.beam);
     view.across = normalized(start.lateral - dot(start.lateral, view.down) * view.down);
     view.middle = start.probe + (0.5 * depth_mm) * view.down;
@@ -184,8 +181,7 @@ Panel ultrasound_panel(const std::string& exercise,
     const auto found = ultrasound.find(exercise);
     if (found == ultrasound.end()) return panel;
     const auto picture = grey_from_png(found->second);
-    if (!picture || picture->width_px != kSheetPanelPx || picture->height_px != kSheetPanelPx)
-        return panel;
+    if (!picture || picture->width_px != kSheetPx || picture->height_px != kSheetPx) return panel;
     panel.caption = "ultrasound";
     for (std::size_t n = 0; n < picture->pixels.size(); ++n)
         std::fill_n(panel.rgb.begin() + 3 * static_cast<std::ptrdiff_t>(n), 3, picture->pixels[n]);
@@ -193,9 +189,8 @@ Panel ultrasound_panel(const std::string& exercise,
 }
 
 void paste(const Panel& panel, int x0, int y0, int width, std::vector<std::uint8_t>& rgb) {
-    for (int y = 0; y < kSheetPanelPx; ++y)
-        std::copy_n(panel.rgb.begin() + 3 * static_cast<std::ptrdiff_t>(y) * kSheetPanelPx,
-                    3 * kSheetPanelPx,
+    for (int y = 0; y < kSheetPx; ++y)
+        std::copy_n(panel.rgb.begin() + 3 * static_cast<std::ptrdiff_t>(y) * kSheetPx, 3 * kSheetPx,
                     rgb.begin() + 3 * (static_cast<std::ptrdiff_t>(y0 + y) * width + x0));
 }
 
@@ -220,8 +215,8 @@ std::vector<std::uint8_t> case_sheet(
     }
     const int rows = static_cast<int>((panels.size() + kColumns - 1) / kColumns);
     constexpr int kTitlePx = 44;
-    const int width = kColumns * (kSheetPanelPx + kGapPx) + kGapPx,
-              height = kTitlePx + rows * (kSheetPanelPx + kCaptionPx + kGapPx);
+    const int width = kColumns * (kSheetPx + kGapPx) + kGapPx,
+              height = kTitlePx + rows * (kSheetPx + kCaptionPx + kGapPx);
     Canvas canvas(width, height);
     canvas.text(bundle.manifest.case_name + text(": %zu structures, %zu exercises, %zu faults",
                                                  bundle.labels.size() - 1, bundle.exercises.size(),
@@ -229,16 +224,16 @@ std::vector<std::uint8_t> case_sheet(
                 {kGapPx, height - 30.0}, {.size_px = 18, .bold = true});
     const auto place = [&](std::size_t n) {
         return std::pair{
-            kGapPx + static_cast<int>(n % kColumns) * (kSheetPanelPx + kGapPx),
-            kTitlePx + static_cast<int>(n / kColumns) * (kSheetPanelPx + kCaptionPx + kGapPx)};
+            kGapPx + static_cast<int>(n % kColumns) * (kSheetPx + kGapPx),
+            kTitlePx + static_cast<int>(n / kColumns) * (kSheetPx + kCaptionPx + kGapPx)};
     };
     for (std::size_t n = 0; n < panels.size(); ++n) {
         const auto [x, y] = place(n);
-        const double base = height - y - kSheetPanelPx - 18.0;  // the canvas counts from below
-        canvas.text(panels[n].caption, {x + kSheetPanelPx / 2.0, base},
+        const double base = height - y - kSheetPx - 18.0;  // the canvas counts from below
+        canvas.text(panels[n].caption, {x + kSheetPx / 2.0, base},
                     {.size_px = 13, .anchor = TextAnchor::middle});
         canvas.text(panels[n].left, {double(x), base}, {.size_px = 13, .bold = true});
-        canvas.text(panels[n].right, {double(x + kSheetPanelPx), base},
+        canvas.text(panels[n].right, {double(x + kSheetPx), base},
                     {.size_px = 13, .bold = true, .anchor = TextAnchor::end});
     }
     std::vector<std::uint8_t> rgb = canvas.rgb();

@@ -74,8 +74,8 @@ endfunction()
 # What a room that says SMALL is compiled with: for size where the rest is compiled for speed.
 set(SONOCASE_SMALL_OPTIONS $<$<CONFIG:Release>:-Os>)
 
-# How many sources of a room are compiled as one, so that what they include is parsed once for all of them: a cold build of the
-# pipeline takes less than half the time. 1 while you work on one room: each is compiled by itself.
+# How many sources of a room are compiled as one, so that what they include is parsed once for all of them: the
+# pipeline takes about half the time. 1 while you work on one room: each is compiled by itself.
 set(SONOCASE_BATCH 8 CACHE STRING "Sources of a room that are compiled together; 1: each by itself")
 
 # sonocase_batch_room(TARGET): what TARGET compiles alike goes in batches. Left alone are sources with options of their own,
