@@ -2,103 +2,97 @@
 
 #include "pipeline/texture/read_example.h"
 
-#include <OpenImageIO/imageio.h>
+#include <dlfcn.h>
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
 #include <filesystem>
 #include <limits>
 #include <utility>
 
+#include "pipeline/texture/image_module.h"
+
 namespace sonocase::pipeline::inline texture {
 namespace {
 
-struct Pixels {
-    int width = 0, height = 0, channels = 0, alpha = -1;
-    std::vector<float> value;  // as stored, not scaled
-    OIIO::TypeDesc::BASETYPE type = OIIO::TypeDesc::UNKNOWN;
-};
+// Beside the program, as it is built, or where it is installed. Opened once, never closed.
+Result<ReadImage*> reader() {
+    static constexpr const char* kModule = "sonocase_images.so";
+    static const Result<ReadImage*> opened = []() -> Result<ReadImage*> {
+        std::error_code failed;
+        const auto self = std::filesystem::read_symlink("/proc/self/exe", failed);
+        const auto bin = self.parent_path();
+        std::string why = "no such file";
+        for (const auto& folder : {bin, bin / SONOCASE_MODULES}) {
+            const std::string file = (folder / kModule).string();
+            if (!std::filesystem::exists(file, failed)) continue;
+            if (void* module = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL)) {
+                if (void* found = dlsym(module, "sonocase_read_image"))
+                    return reinterpret_cast<ReadImage*>(found);
+            }
+            if (const char* said = dlerror()) why = said;
+        }
+        return Error{"the reader of images cannot be opened (" + why + ")", kModule,
+                     "expected beside the program " + self.string() +
+                         "; install sonocase again, or build all of it"};
+    }();
+    return opened;
+}
 
-Result<Pixels> read_pixels(const std::string& path, int frame) {
+Result<StoredImage> read_pixels(const std::string& path, int frame) {
     std::error_code status;
     if (!std::filesystem::is_regular_file(path, status)) {
         return Error{"no such file", path, "expected an image: PNG, TIFF or a DICOM frame"};
     }
-    try {
-        OIIO::ImageSpec configuration;
-        configuration["oiio:UnassociatedAlpha"] = 1;
-        auto input = OIIO::ImageInput::open(path, &configuration);
-        if (!input) {
-            std::string why = OIIO::geterror();
-            std::replace(why.begin(), why.end(), '\n', ' ');
-            return Error{"not an image that can be read" + (why.empty() ? "" : " (" + why + ")"),
-                         path, "expected PNG, TIFF or a DICOM frame"};
-        }
-        if (!input->seek_subimage(frame, 0)) {
+    SONOCASE_TRY(ReadImage * read, reader());
+    StoredImage image;
+    std::string why;
+    const ImageFailure failure = read(path.c_str(), frame, image, why);
+    if (!why.empty()) why = " (" + why + ")";
+    switch (failure) {
+        case ImageFailure::none: return image;
+        case ImageFailure::not_an_image:
+            return Error{"not an image that can be read" + why, path,
+                         "expected PNG, TIFF or a DICOM frame"};
+        case ImageFailure::no_frame:
             return Error{"no frame " + std::to_string(frame), path, "frames count from 0"};
-        }
-        const OIIO::ImageSpec spec = input->spec();
-        constexpr int kMax = 16384;
-        if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1 || spec.width > kMax ||
-            spec.height > kMax || spec.nchannels > 8 || spec.depth > 1) {
-            return Error{"image of " + std::to_string(spec.width) + " x " +
-                             std::to_string(spec.height) + " x " + std::to_string(spec.depth) +
-                             " pixels, " + std::to_string(spec.nchannels) + " channels",
+        case ImageFailure::size:
+            return Error{"image of " + std::to_string(image.width) + " x " +
+                             std::to_string(image.height) + " x " + std::to_string(image.depth) +
+                             " pixels, " + std::to_string(image.channels) + " channels",
                          path, "expected a flat image of at most 16384 pixels a side"};
-        }
-        Pixels out;
-        out.width = spec.width;
-        out.height = spec.height;
-        out.channels = spec.nchannels;
-        out.alpha = spec.alpha_channel;
-        out.type = static_cast<OIIO::TypeDesc::BASETYPE>(spec.format.basetype);
-        out.value.resize(static_cast<std::size_t>(spec.width) * spec.height * spec.nchannels);
-        if (!input->read_image(frame, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT,
-                               out.value.data())) {
-            std::string why = input->geterror();
-            std::replace(why.begin(), why.end(), '\n', ' ');
-            return Error{"image cannot be read to its end (" + why + ")", path,
+        case ImageFailure::damaged:
+            return Error{"image cannot be read to its end" + why, path,
                          "the file looks damaged; export it again"};
-        }
-        return out;
-    } catch (const std::exception& failure) {
-        return Error{std::string("image cannot be read (") + failure.what() + ")", path,
-                     "expected PNG, TIFF or a DICOM frame"};
+        case ImageFailure::other: break;
     }
+    return Error{"image cannot be read" + why, path, "expected PNG, TIFF or a DICOM frame"};
 }
 
 // Grey of OpenImageIO's 1.0.
-double grey_scale(const Pixels& pixels, std::vector<std::string>* notes, const std::string& path) {
+double grey_scale(const StoredImage& pixels,
+                  std::vector<std::string>* notes,
+                  const std::string& path) {
     float top = 0;
     for (const float v : pixels.value) {
         if (std::isfinite(v)) top = std::max(top, v);
     }
-    using T = OIIO::TypeDesc;
-    if (pixels.type == T::UINT8 || pixels.type == T::INT8) return 255;
-    if (pixels.type == T::UINT16 || pixels.type == T::INT16 || pixels.type == T::UINT32 ||
-        pixels.type == T::INT32) {
-        const double full = pixels.type == T::UINT16   ? 65535.0
-                            : pixels.type == T::INT16  ? 32767.0
-                            : pixels.type == T::UINT32 ? 4294967295.0
-                                                       : 2147483647.0;
-        const double stored = top * full;
-        for (const double used : {255.0, 1023.0, 4095.0}) {
-            if (stored <= used && full > used) {
-                if (notes) {
-                    notes->push_back(path +
-                                     ": greater pixel type than its values need; read with " +
-                                     std::to_string(static_cast<int>(used)) + " as white.");
-                }
-                return 255 * full / used;
+    // Floating point, in [0, 255] or [0, 1].
+    if (pixels.full == 0) return top > 1.5f ? 1 : 255;
+    const double stored = top * pixels.full;
+    for (const double used : {255.0, 1023.0, 4095.0}) {
+        if (stored <= used && pixels.full > used) {
+            if (notes) {
+                notes->push_back(path + ": greater pixel type than its values need; read with " +
+                                 std::to_string(static_cast<int>(used)) + " as white.");
             }
+            return 255 * pixels.full / used;
         }
-        return 255;
     }
-    return top > 1.5f ? 1 : 255;  // floating point, in [0, 255] or [0, 1]
+    return 255;
 }
 
-Result<PixelRectangle> part_of(const Pixels& pixels,
+Result<PixelRectangle> part_of(const StoredImage& pixels,
                                const std::optional<PixelRectangle>& wanted,
                                const std::string& path) {
     if (!wanted) return PixelRectangle{0, 0, pixels.width, pixels.height};
@@ -114,7 +108,7 @@ Result<PixelRectangle> part_of(const Pixels& pixels,
     return part;
 }
 
-Result<Pixels> read_mask_for(const Pixels& pixels, const std::string& path) {
+Result<StoredImage> read_mask_for(const StoredImage& pixels, const std::string& path) {
     SONOCASE_TRY(auto mask, read_pixels(path, 0));
     if (mask.width != pixels.width || mask.height != pixels.height) {
         return Error{"mask of " + std::to_string(mask.width) + " x " + std::to_string(mask.height) +
@@ -131,10 +125,10 @@ Result<ExampleImage> read_example(const std::string& path,
                                   const ReadExampleOptions& options,
                                   std::vector<std::string>* notes) {
     SONOCASE_TRY(auto read, read_pixels(path, options.frame));
-    const Pixels& pixels = read;
+    const StoredImage& pixels = read;
     SONOCASE_TRY(const auto rectangle, part_of(pixels, options.rectangle, path));
     const PixelRectangle part = rectangle;
-    Pixels mask;
+    StoredImage mask;
     double mask_scale = 0;
     if (!options.mask_path.empty()) {
         SONOCASE_TRY(auto read_mask, read_mask_for(pixels, options.mask_path));

@@ -17,13 +17,13 @@ function(install_manuals program)
   install(FILES ${packaging}/copyright DESTINATION ${share}/doc/${program} COMPONENT ${program})
 endfunction()
 
-# install_sbom(PACKAGE FILE COMPONENT): every library that FILE is made of, with version and licence (CycloneDX). Debian's
+# install_sbom(PACKAGE FILE COMPONENT [MODULE...]): every library that FILE and its MODULEs are made of, with version and licence (CycloneDX). Debian's
 # packages are asked for both, so that elsewhere none is made.
 function(install_sbom package file component)
   set(made ${CMAKE_BINARY_DIR}/sbom/${package}.cdx.json)
   find_program(DPKG_QUERY dpkg-query)
   if(DPKG_QUERY AND EXISTS /usr/bin/python3)
-    install(CODE "execute_process(COMMAND ${packaging}/sbom ${file} ${made} ${PROJECT_VERSION} COMMAND_ERROR_IS_FATAL ANY)"
+    install(CODE "execute_process(COMMAND ${packaging}/sbom ${file} ${made} ${PROJECT_VERSION} ${ARGN} COMMAND_ERROR_IS_FATAL ANY)"
             COMPONENT ${component})
     install(FILES ${made} DESTINATION ${share}/doc/${package} RENAME sbom.cdx.json COMPONENT ${component})
   endif()
@@ -49,7 +49,7 @@ if(TARGET sonocase_python)
 endif()
 if(SONOCASE_PIPELINE)
   install_manuals(sonocase)
-  install_sbom(sonocase $<TARGET_FILE:sonocase> sonocase)
+  install_sbom(sonocase $<TARGET_FILE:sonocase> sonocase $<TARGET_FILE:sonocase_images>)
   install(DIRECTORY scenarios DESTINATION ${share}/sonocase COMPONENT sonocase)
   install(DIRECTORY docs/ DESTINATION ${share}/doc/sonocase COMPONENT sonocase)
 endif()
