@@ -225,6 +225,8 @@ CaseSize case_size(const Recipe& recipe) {
         (pool ? size.pools : size.lesions) += 1;
     }
     size.texture_edge = recipe.settings.of<TextureStageOptions>().bank.edge;
+    constexpr double kImageMb = 82;  // what `texture` takes with an image and without
+    if (!recipe.inputs.examples.empty()) size.image_mb = kImageMb;
     return size;
 }
 
@@ -249,13 +251,16 @@ MemoryNeed memory_need(const Recipe& recipe, double limit_mb) {
     const double limit = limit_mb > 0 ? limit_mb : machine_memory_mb();
     MemoryNeed need;
     need.size = case_size(recipe);
+    double kept_mb = 0;  // by a build, which is one program, from the textures on
     for (const PlannedStage& stage : plan_stages(recipe, {})) {
         if (stage.is_step()) continue;
         const StageCost& cost = stage.descriptor->cost;
-        const double all = cost.memory_mb(need.size);
+        const double all = cost.memory_mb(need.size) + kept_mb;
         const double mb =
-            all <= limit ? all
-                         : std::max<double>(cost.memory_mb(need.size, true), std::min(all, limit));
+            all <= limit
+                ? all
+                : std::max(cost.memory_mb(need.size, true) + kept_mb, std::min(all, limit));
+        if (stage.stage == stage_names::kTexture) kept_mb = need.size.image_mb;
         if (mb <= need.mb) continue;
         need.mb = mb;
         need.stage = stage.stage;
@@ -278,9 +283,9 @@ Status check_memory(const MemoryNeed& need, double limit_mb) {
 
 namespace {
 
-// What one stage takes alone was read off its own clock: the program's start and end, the fit, one
+// What one stage takes alone was read off its own clock: the program with its probes, the fit, one
 // refit to half of the readings, one texture.
-constexpr double kProgramS = 0.8, kFitS = 2.6, kRefitS = 0.27, kRefitOfQuadraticS = 0.2,
+constexpr double kProgramS = 1.3, kFitS = 2.6, kRefitS = 0.27, kRefitOfQuadraticS = 0.2,
                  kTextureS = 0.1;
 // Relative least squares over 26 builds (docs/farm.md). For a million cooked voxels in the body and
 // in its surfaces, for a million faces of the map, and for a million nodes between thick slices,
@@ -299,18 +304,28 @@ constexpr double kMendS = 3.3, kMeshS = 0.28, kElasticS = 3.5, kElasticRefitS = 
 constexpr double kLesionS = 0.0112, kPoolS = 0.134;
 // What one thread does alone: the start, the import, textures, the fit's last steps, packing.
 constexpr double kSerialS = 3.0, kSerialVolumeS = 0.012;
-// Seconds of the probe below when those builds were measured.
-constexpr double kProbeS = 0.115;
-constexpr int kProbes = 3;
+// Seconds of the probe below: .115 when those builds were measured, on a machine with a load of 5
+// to 9. On an idle one it takes .095, and builds a fifth more than that says: between the two.
+constexpr double kProbeS = 0.106;
+constexpr int kProbes = 3, kMostCopies = 8;
 
-double probe_processor_seconds() {
-    const double before = processor_seconds();
+void work_of_the_probe() {
     const LabelVolume ct = sample_analytic_torso(analytic_torso_grid({26, 26, 26}));
     ResampleOptions options;
     options.voxel_mm = 10;
     const Registration truth = analytic_torso_truth();
     (void)resample_labels({ct, truth}, options);
-    return processor_seconds() - before;
+}
+
+// Of one of `copies` that work side by side, as the threads of a build do: on cores that share their
+// units each takes up to a half longer than one alone.
+double probe_processor_seconds(int copies) {
+    const double before = processor_seconds();
+    std::vector<std::thread> others;
+    for (int n = 1; n < copies; ++n) others.emplace_back(work_of_the_probe);
+    work_of_the_probe();
+    for (std::thread& other : others) other.join();
+    return (processor_seconds() - before) / copies;
 }
 
 }  // namespace
@@ -363,9 +378,11 @@ BuildTime build_time(
 
 // The fastest of them: whatever else the machine does slows down single ones by up to a half, and a
 // build, which lasts longer, by a tenth.
-double machine_speed() {
-    double least = probe_processor_seconds();
-    for (int n = 1; n < kProbes; ++n) least = std::min(least, probe_processor_seconds());
+double machine_speed(int threads) {
+    const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    const int copies = std::clamp(threads > 0 ? std::min(threads, cores) : cores, 1, kMostCopies);
+    double least = probe_processor_seconds(copies);
+    for (int n = 1; n < kProbes; ++n) least = std::min(least, probe_processor_seconds(copies));
     return least / kProbeS;
 }
 

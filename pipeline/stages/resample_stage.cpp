@@ -249,7 +249,7 @@ double more_mb(const CaseSize& size, bool least) {
     const double measured_mb =
         kMeasured * size.surfaces * (nodes > kWhole ? kInParts : 1) + dense_mb;
     return 2 * size.label_voxels + kHeld * size.surfaces +
-           std::max(measured_mb, kNode * nodes + 3 * size.cooked_voxels);
+           std::max(measured_mb, kNode * nodes + kCooked * size.cooked_voxels);
 }
 
 StageVerb verb() {
@@ -295,7 +295,7 @@ StageDescriptor resample_stage() {
     stage.codec = label_codec(kLabels);
     stage.reports = reports_of(kLabels);
     stage.share = 0.4;
-    stage.cost = {.threads = 2, .base_mb = 165, .per_region_voxel = 1.5, .more_mb = more_mb};
+    stage.cost = {.threads = 2, .base_mb = 95, .per_region_voxel = 1.5, .more_mb = more_mb};
     stage.verb = verb();
     return stage;
 }

@@ -134,7 +134,7 @@ StageDescriptor smooth_stage() {
     stage.codec = label_codec(kLabels);
     stage.reports = reports_of(kLabels);
     stage.share = 0.1;
-    stage.cost = {.threads = 2, .base_mb = 340, .per_cooked_voxel = 12};
+    stage.cost = {.threads = 2, .base_mb = 258, .per_cooked_voxel = 12};
     stage.verb = verb();
     return stage;
 }

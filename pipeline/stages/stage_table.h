@@ -180,6 +180,7 @@ struct CaseSize {
     double labels = kUsualLabels;      // number
     double textures = kUsualTextures;  // number that their tissues name
     double sampling_s = 0;             // processor seconds of sampling an analytic body
+    double image_mb = 0;               // libraries that read the images textures are learnt from
 
     // Millions, in the box of the body, which fills little of that of organ meshes.
     double nodes() const { return std::max(label_voxels - 0.4 * mesh_voxels, interpolated_nodes); }
@@ -199,7 +200,7 @@ struct CaseSize {
 // the measurements.
 struct StageCost {
     int threads = 1;
-    double base_mb = 180;  // of which some 160 are the program's libraries
+    double base_mb = 98;  // of which some 80 are the program's libraries
     double per_label_mb = 0, per_label_voxel = 0, per_cooked_voxel = 0;
     double per_region_voxel = 0;
     double per_mesh_voxel = 0;

@@ -133,7 +133,7 @@ StageDescriptor structure_stage() {
     stage.reports = reports_of(kStructure);
     stage.share = 0.2;
     stage.cost = {.threads = 2,
-                  .base_mb = 175,
+                  .base_mb = 93,
                   .per_cooked_voxel = 5,
                   .per_region_voxel = 1.5,
                   .more_mb = more_mb};

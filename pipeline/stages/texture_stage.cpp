@@ -65,7 +65,7 @@ Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
 
 // The transforms of the largest cubes that are matched to each other.
 double more_mb(const CaseSize& size, bool) {
-    return 31 * std::pow(size.texture_edge / 64, 3);
+    return 31 * std::pow(size.texture_edge / 64, 3) + size.image_mb;
 }
 
 Bytes encode(const TextureFile& file) {

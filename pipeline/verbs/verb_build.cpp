@@ -312,7 +312,7 @@ int build_one(const BuildOptions& options) {
     if (!recipe) return fail("build", recipe.error());
     const bool say = !options.common.quiet || options.target.tolerance_mm > 0 ||
                      options.target.time_budget_s > 0 || !options.common.report_path.empty();
-    const double speed = say ? machine_speed() : 1;
+    const double speed = say ? machine_speed(options.common.threads) : 1;
     const auto choice = choose(options, *recipe, speed);
     if (!choice) return fail("build", choice.error());
     const MemoryNeed need = memory_need(*recipe, options.memory_mb);

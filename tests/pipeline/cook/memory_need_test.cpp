@@ -21,6 +21,10 @@
 namespace sonocase::pipeline {
 namespace {
 
+// MB. The peaks below were measured when every program linked the readers of images, which are now
+// opened where an image is read: 161.7 at its start then, 79.4 since.
+constexpr double kLess = 82;
+
 // No exercises: the recipe would otherwise look for them beside it, which is where the test runs.
 MemoryNeed need_of(const std::string& text, double limit_mb = 0) {
     const std::vector<EmbeddedExercise> none;
@@ -42,7 +46,7 @@ TEST(MemoryNeed, IsWithinFifteenPercentOfWhatABuildTook) {
     for (const auto& m : measured) {
         const MemoryNeed need = need_of(head + m.voxels);
         EXPECT_EQ(need.stage, m.stage);
-        EXPECT_NEAR(need.mb / m.peak_mb, 1, 0.15) << m.voxels;
+        EXPECT_NEAR(need.mb / (m.peak_mb - kLess), 1, 0.15) << m.voxels;
     }
 }
 
@@ -69,7 +73,7 @@ TEST(MemoryNeed, OfPhantomNeckAndFreeFluidIsWithinFifteenPercentAsWell) {
     for (const auto& m : measured) {
         const MemoryNeed need = need_of(m.recipe);
         EXPECT_EQ(need.stage, m.stage) << m.recipe;
-        EXPECT_NEAR(need.mb / m.peak_mb, 1, 0.15) << m.recipe;
+        EXPECT_NEAR(need.mb / (m.peak_mb - kLess), 1, 0.15) << m.recipe;
     }
 }
 
@@ -90,7 +94,7 @@ TEST(MemoryNeed, OfACtIsThatOfTheDistancesThatItsMapHas) {
             "/mannequin/sweep.csv\"\n[resample]\nvoxel_mm = " +
             m.voxel + "\n");
         EXPECT_GT(need.size.held_mb, 50) << m.labels;
-        EXPECT_NEAR(need.mb / m.peak_mb, 1, 0.15) << m.labels << " " << m.voxel;
+        EXPECT_NEAR(need.mb / (m.peak_mb - kLess), 1, 0.15) << m.labels << " " << m.voxel;
     }
 }
 
@@ -101,7 +105,7 @@ TEST(MemoryNeed, OfOrganMeshesIsThatOfTheVoxelsThatTheyBecome) {
          {std::pair{6.75, 352.5}, std::pair{22.8, 756.2}, std::pair{54.0, 1497.0}}) {
         CaseSize size;
         size.label_voxels = size.mesh_voxels = million;
-        EXPECT_NEAR(import.cost.memory_mb(size) / peak_mb, 1, 0.15) << million;
+        EXPECT_NEAR(import.cost.memory_mb(size) / (peak_mb - kLess), 1, 0.15) << million;
     }
 }
 
@@ -116,7 +120,7 @@ TEST(MemoryNeed, OfResampledOrganMeshesGoesByTheirFaces) {
         size.label_voxels = size.mesh_voxels = m.million;
         size.surfaces = m.faces;
         size.cooked_voxels = m.cooked;
-        EXPECT_NEAR(resample.cost.memory_mb(size) / m.peak_mb, 1, 0.15) << m.million;
+        EXPECT_NEAR(resample.cost.memory_mb(size) / (m.peak_mb - kLess), 1, 0.15) << m.million;
     }
 }
 
@@ -131,7 +135,7 @@ TEST(MemoryNeed, OfStructureGoesByTheDepthsAsWell) {
         CaseSize size;
         size.cooked_voxels = m.cooked;
         size.cooked_mm = m.voxel_mm;
-        EXPECT_NEAR(structure.cost.memory_mb(size) / m.peak_mb, 1, 0.15) << m.voxel_mm;
+        EXPECT_NEAR(structure.cost.memory_mb(size) / (m.peak_mb - kLess), 1, 0.15) << m.voxel_mm;
     }
 }
 
@@ -139,7 +143,7 @@ TEST(MemoryNeed, OfStructureGoesByTheDepthsAsWell) {
 TEST(MemoryNeed, OfThickSlicesIsThatOfTheNodesBetweenThem) {
     const std::string head = "name = \"a\"\n[analytic]\nvoxel_mm = 2\n";
     const MemoryNeed thick = need_of(head + "slice_mm = 3\n[resample]\nvoxel_mm = 3\n");
-    EXPECT_NEAR(thick.mb / 650, 1, 0.15);  // demo-torso's map, two threads
+    EXPECT_NEAR(thick.mb / (650 - kLess), 1, 0.15);  // demo-torso's map, two threads
     const MemoryNeed even = need_of(head + "slice_mm = 2\n[resample]\nvoxel_mm = 3\n");
     EXPECT_EQ(even.size.interpolated_nodes, 0);
     EXPECT_GT(thick.size.interpolated_nodes, thick.size.label_voxels);
@@ -168,7 +172,7 @@ TEST(MemoryNeed, OfALargeStackOfThickSlicesIsThatOfItsColumns) {
                                    "\n[resample]\nvoxel_mm = " + m.cooked_mm + "\n";
         const MemoryNeed need = need_of(recipe);
         EXPECT_EQ(need.stage, "resample") << recipe;
-        EXPECT_NEAR(need.mb / m.peak_mb, 1, 0.15) << recipe;
+        EXPECT_NEAR(need.mb / (m.peak_mb - kLess), 1, 0.15) << recipe;
     }
 }
 
@@ -216,7 +220,7 @@ TEST(MemoryNeed, GoesByTheEdgeOfTheTextures) {
     size.cooked_voxels = 15.5;
     size.texture_edge = 128;
     const StageDescriptor& texture = *built_in_stages().find("texture");
-    EXPECT_NEAR(texture.cost.memory_mb(size) / 468.0, 1, 0.15);
+    EXPECT_NEAR(texture.cost.memory_mb(size) / (468 - kLess), 1, 0.15);
 }
 
 // Round a label: the box that the analytic liver has in the map, and twice the margin. The cooked
