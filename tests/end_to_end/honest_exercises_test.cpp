@@ -164,7 +164,7 @@ TEST(HonestExercises, ExpertsPassTheProceduresInThePlayer) {
 
 TEST(HonestExercises, TheExpertPassesTheCentralLineInThePlayerAndTheNeckIsChecked) {
     const testing::TemporaryFolder folder;
-    const std::string path = testing::cooked_scenario("neck", "--set resample.voxel_mm=1.5").path;
+    const std::string path = testing::cooked_scenario("neck").path;
     for (const char* exercise : {"central-line", "jugular-across"})
         testing::expect_expert_ticks_all(path, exercise);
     const auto check = testing::run_command(std::string(SONOCASE_BIN) + "/sonocase check " + path +

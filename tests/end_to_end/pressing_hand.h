@@ -41,7 +41,10 @@ class PressingHand {
         runtime::ImageChoice image = runtime::initial_image({}, exercise_);
         image.width_px = image.height_px = 32;
         if (!options.model.empty()) image.model = options.model;
-        auto engine = runtime::make_engine(open, exercise_, {}, image);
+        // Model `paper` is for hands that are scored by their poses alone: nobody looks at it.
+        runtime::PlayerArguments arguments;
+        if (image.model == "paper") arguments.scanlines = arguments.samples = 32;
+        auto engine = runtime::make_engine(open, exercise_, arguments, image);
         EXPECT_TRUE(engine) << engine.error().message();
         engine_.emplace(std::move(*engine));
         auto run =

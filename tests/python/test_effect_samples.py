@@ -25,8 +25,9 @@ def torso(tmp_path_factory):
     if not (DATA.is_dir() and program.exists()):
         pytest.skip("needs the real data in ../shared/data and the pipeline")
     bundle = tmp_path_factory.mktemp("torso") / "torso.sonocase"
-    subprocess.run([program, "build", ROOT / "scenarios/real-torso", "--data", DATA, "--preset", "draft", "--quiet", "-o", bundle],
-                   check=True)
+    cache = os.environ.get("SONOCASE_TEST_CACHE", bundle.parent / "cache")
+    subprocess.run([program, "build", ROOT / "scenarios/real-torso", "--data", DATA, "--preset", "draft", "--cache", cache, "--quiet",
+                    "-o", bundle], check=True)
     sys.path.insert(0, str(SAMPLES))
     yield importlib.import_module("torso").Torso(sonocase.Case.open(bundle))
     sys.path.remove(str(SAMPLES))
