@@ -256,10 +256,9 @@ MemoryNeed memory_need(const Recipe& recipe, double limit_mb) {
         if (stage.is_step()) continue;
         const StageCost& cost = stage.descriptor->cost;
         const double all = cost.memory_mb(need.size) + kept_mb;
-        const double mb =
-            all <= limit
-                ? all
-                : std::max(cost.memory_mb(need.size, true) + kept_mb, std::min(all, limit));
+        const double mb = all <= limit ? all
+                                       : std::max(cost.memory_mb(need.size, true) + kept_mb,
+                                                  std::min(all, limit));
         if (stage.stage == stage_names::kTexture) kept_mb = need.size.image_mb;
         if (mb <= need.mb) continue;
         need.mb = mb;
@@ -283,9 +282,9 @@ Status check_memory(const MemoryNeed& need, double limit_mb) {
 
 namespace {
 
-// What one stage takes alone was read off its own clock: the program with its probes, the fit, one
+// What one stage takes alone was read off its own clock: the program's start and end, the fit, one
 // refit to half of the readings, one texture.
-constexpr double kProgramS = 1.3, kFitS = 2.6, kRefitS = 0.27, kRefitOfQuadraticS = 0.2,
+constexpr double kProgramS = 0.8, kFitS = 2.6, kRefitS = 0.27, kRefitOfQuadraticS = 0.2,
                  kTextureS = 0.1;
 // Relative least squares over 26 builds (docs/farm.md). For a million cooked voxels in the body and
 // in its surfaces, for a million faces of the map, and for a million nodes between thick slices,
@@ -317,8 +316,8 @@ void work_of_the_probe() {
     (void)resample_labels({ct, truth}, options);
 }
 
-// Of one of `copies` that work side by side, as the threads of a build do: on cores that share their
-// units each takes up to a half longer than one alone.
+// Of one of `copies` that work side by side, as the threads of a build do: on cores that share
+// their units each takes up to a half longer than one alone.
 double probe_processor_seconds(int copies) {
     const double before = processor_seconds();
     std::vector<std::thread> others;

@@ -64,9 +64,9 @@ BuildTime build_time(
     const Recipe& recipe, const CaseSize& size, double sized_voxel_mm, double speed, int threads);
 
 // Returns the processor seconds that a fixed piece of the pipeline's own work takes on this machine
-// as it is now, over those on the machine of the fit; of three runs the fastest counts. Each is made
-// by as many threads side by side as a build would have (0: all cores), which slow each other down
-// as those do. Takes a third of a second.
+// as it is now, over those on the machine of the fit; of three runs the fastest counts. Each is
+// made by as many threads side by side as a build would have (0: all cores), which slow each other
+// down as those do. Takes a third of a second.
 double machine_speed(int threads = 0);
 
 }  // namespace sonocase::pipeline::inline cook

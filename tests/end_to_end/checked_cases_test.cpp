@@ -49,8 +49,8 @@ const CaseBundle* cooked(const Body& body) {
     const std::string data = SONOCASE_DATA;
     if (std::string(body.scenario) != "demo-torso" && !fs::exists(data + "/ct/labels.nii.gz"))
         return nullptr;
-    auto bundle = load_bundle(
-        cooked_scenario(body.scenario + std::string("/case.toml"), body.settings).path);
+    auto bundle =
+        load_bundle(cooked_scenario(body.scenario + std::string("/case.toml"), body.settings).path);
     EXPECT_TRUE(bundle) << bundle.error().message();
     if (!bundle) return nullptr;
     return &known.emplace(body.scenario, std::move(*bundle)).first->second;
@@ -241,8 +241,7 @@ TEST(CheckedCases, WhatTheSkinDoesNotTellIsSaidByBuildAndByCheck) {
     if (bundle == nullptr) GTEST_SKIP() << "no " << SONOCASE_DATA;
     const std::string open = "not verified: the skin does not tell right from left, ";
     const std::string said =
-        cooked_scenario(kBodies[1].scenario + std::string("/case.toml"), kBodies[1].settings)
-            .error;
+        cooked_scenario(kBodies[1].scenario + std::string("/case.toml"), kBodies[1].settings).error;
     EXPECT_NE(said.find("warning: " + open), std::string::npos) << said;
     const std::vector<std::string> remarks = check_case(*bundle).remarks;
     EXPECT_EQ(std::count_if(remarks.begin(), remarks.end(),

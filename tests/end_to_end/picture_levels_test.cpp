@@ -554,8 +554,8 @@ TEST(PictureLevels, OfTheProcedures) {
 }
 
 TEST(PictureLevels, OfEveryOtherScenario) {
-    // Cooked as the tests that play them cook them; the neck as a trainee has it (in voxels of 1.5 mm
-    // one plane of a script is at 115).
+    // Cooked as the tests that play them cook them; the neck as a trainee has it (in voxels of 1.5
+    // mm one plane of a script is at 115).
     const char* fine = "--set resample.voxel_mm=1.5";
     expect_all_open_well(testing::cooked_scenario("neck").path);
     expect_all_open_well(testing::cooked_scenario("flow-phantom").path);
