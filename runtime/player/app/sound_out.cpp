@@ -71,7 +71,7 @@ Result<std::unique_ptr<SoundOut>> SoundOut::open(const SoundDevice& device) {
     auto alsa = std::make_unique<Alsa>();
     alsa->library = dlopen(device.library.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (!alsa->library)
-        return Error{Message("there is no sound: {} cannot be loaded", {device.library}), "sound",
+        return Error{Message("there is no sound: {} cannot be loaded", {device.library}), "",
                      "install libasound2, or go on without sound"};
     int (*open_pcm)(void**, const char*, int, int) = nullptr;
     int (*set_params)(void*, int, int, unsigned, unsigned, int, unsigned) = nullptr;
@@ -83,7 +83,7 @@ Result<std::unique_ptr<SoundOut>> SoundOut::open(const SoundDevice& device) {
     if (!find(open_pcm, "snd_pcm_open") || !find(set_params, "snd_pcm_set_params") ||
         !find(alsa->close, "snd_pcm_close") || !find(alsa->writei, "snd_pcm_writei") ||
         !find(alsa->recover, "snd_pcm_recover"))
-        return Error{Message("there is no sound: {} lacks a function", {device.library}), "sound",
+        return Error{Message("there is no sound: {} lacks a function", {device.library}), "",
                      "install libasound2, or go on without sound"};
     int (*set_handler)(void (*)(const char*, int, const char*, int, const char*, ...)) = nullptr;
     if (find(set_handler, "snd_lib_error_set_handler")) set_handler(say_nothing);
@@ -91,8 +91,8 @@ Result<std::unique_ptr<SoundOut>> SoundOut::open(const SoundDevice& device) {
     if (!opened) alsa->pcm = nullptr;
     if (!opened || set_params(alsa->pcm, kSigned16, kInterleaved, 2, kRate, 1, kDeviceDelayUs) != 0)
         return Error{
-            Message("there is no sound: the device \"{}\" cannot be opened", {device.name}),
-            "sound", "choose a default device, or go on without sound"};
+            Message("there is no sound: the device \"{}\" cannot be opened", {device.name}), "",
+            "choose a default device, or go on without sound"};
     return std::unique_ptr<SoundOut>(new SoundOut(std::move(alsa)));
 }
 

@@ -17,7 +17,7 @@ SoundOut* sound_out(PlayerState& player, CaseState& loaded, Sounds& sounds) {
     auto out = SoundOut::open();
     if (!out) {
         sounds.failed = true;
-        player.notices.news(out.error().message());
+        player.notices.warning(out.error().message());
         return nullptr;
     }
     sounds.out = std::shared_ptr<SoundOut>(std::move(*out));

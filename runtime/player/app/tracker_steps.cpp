@@ -142,7 +142,7 @@ void toggle_needle(TrackerInUse& tracker, const Probe& probe, bool in_plane, Not
         return;
     }
     if (!tracker.mouse->take_needle(probe, in_plane))
-        notices.news("There is no skin beside the probe to put the needle on.");
+        notices.warning("There is no skin beside the probe to put the needle on.");
 }
 
 void feed_mouse(TrackerInUse& tracker, double now_s) {

@@ -79,6 +79,7 @@ TEST(SoundOut, WithoutLibraryOrDeviceSaysSo) {
     const auto none = SoundOut::open({"libthereisnone.so.9", "default"});
     ASSERT_FALSE(none);
     EXPECT_NE(none.error().message().find("libthereisnone"), std::string::npos);
+    EXPECT_EQ(none.error().message().find("there is no sound: "), 0u);
     const auto closed = SoundOut::open({kFake, "no such device"});
     ASSERT_FALSE(closed);
     EXPECT_NE(closed.error().message().find("no such device"), std::string::npos);

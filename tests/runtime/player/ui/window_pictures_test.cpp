@@ -101,5 +101,23 @@ TEST(WindowPictures, EveryPanelLooksAsKeptAtBothSizes) {
     }
 }
 
+// The picture of docs/training.md is of the window as it is: its console and the row under the
+// picture are those of the kept one, whatever the case. `scripts/draw-pictures window` draws it.
+TEST(WindowPictures, TheOneOfTheDocumentsIsOfThisWindow) {
+    const Picture drawn =
+        load_picture(SONOCASE_SOURCE "/docs/pictures/training/window.png").reduced(4);
+    const Picture kept = load_picture(SONOCASE_SOURCE "/tests/golden/window/panels.png");
+    ASSERT_EQ(drawn.width, kept.width);
+    ASSERT_EQ(drawn.height, kept.height);
+    const struct {
+        const char* what;
+        int x0, y0, x1, y1;  // of 320 x 180
+    } parts[] = {{"console", 246, 12, 318, 178}, {"row under the picture", 72, 162, 244, 178}};
+    for (const auto& part : parts)
+        EXPECT_LT(drawn.difference(kept, part.x0, part.y0, part.x1, part.y1, kChangedLevels),
+                  kChangedShare)
+            << part.what;
+}
+
 }  // namespace
 }  // namespace sonocase::runtime
