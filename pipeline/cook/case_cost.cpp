@@ -306,7 +306,7 @@ constexpr double kSerialS = 3.0, kSerialVolumeS = 0.012;
 // Seconds of the probe below: .115 when those builds were measured, on a machine with a load of 5
 // to 9. On an idle one it takes .095, and builds a fifth more than that says: between the two.
 constexpr double kProbeS = 0.106;
-constexpr int kProbes = 3, kMostCopies = 8;
+constexpr int kProbes = 3, kMaxCopies = 8;
 
 void work_of_the_probe() {
     const LabelVolume ct = sample_analytic_torso(analytic_torso_grid({26, 26, 26}));
@@ -316,8 +316,8 @@ void work_of_the_probe() {
     (void)resample_labels({ct, truth}, options);
 }
 
-// Of one of `copies` that work side by side, as the threads of a build do: on cores that share
-// their units each takes up to a half longer than one alone.
+// Returns what one of `copies` takes that work side by side, as the threads of a build do: on cores
+// that share their units each takes up to a half longer than one alone.
 double probe_processor_seconds(int copies) {
     const double before = processor_seconds();
     std::vector<std::thread> others;
@@ -379,7 +379,7 @@ BuildTime build_time(
 // build, which lasts longer, by a tenth.
 double machine_speed(int threads) {
     const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-    const int copies = std::clamp(threads > 0 ? std::min(threads, cores) : cores, 1, kMostCopies);
+    const int copies = std::clamp(threads > 0 ? std::min(threads, cores) : cores, 1, kMaxCopies);
     double least = probe_processor_seconds(copies);
     for (int n = 1; n < kProbes; ++n) least = std::min(least, probe_processor_seconds(copies));
     return least / kProbeS;

@@ -23,7 +23,7 @@ using sonocase::testing::read_text;
 class WindowModes : public sonocase::testing::WindowRun {
   protected:
     WindowModes() : WindowRun(sonocase::testing::flowing_case(), "tube.sonocase") {
-        // Whose machine has no device for it is told so.
+        // Without a sound device the player would say so on standard error.
         folder_.write("config/sonocase/player.json", R"({"sound": false})");
     }
     CommandResult run(const std::string& arguments, const std::string& script) {
