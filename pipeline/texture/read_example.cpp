@@ -41,6 +41,11 @@ Result<ReadImage*> reader() {
 
 Result<StoredImage> read_pixels(const std::string& path, int frame) {
     std::error_code status;
+    if (std::filesystem::is_directory(path, status)) {
+        return Error{"a folder", path,
+                     "expected an image: PNG, TIFF or a DICOM frame (--examples takes a folder of "
+                     "patches)"};
+    }
     if (!std::filesystem::is_regular_file(path, status)) {
         return Error{"no such file", path, "expected an image: PNG, TIFF or a DICOM frame"};
     }

@@ -134,7 +134,9 @@ TEST_F(Folder, MissingTruncatedAndForeignFilesAreRefusedByName) {
         write_netpbm("a.pgm", 64, 64, 255, 1, [](int x, int y, int) { return x ^ y; });
     std::filesystem::resize_file(whole, 900);
     EXPECT_FALSE(read_example(whole));
-    EXPECT_FALSE(read_example(path_.string()));
+    const auto folder = read_example(path_.string());
+    ASSERT_FALSE(folder);
+    EXPECT_NE(folder.error().message().find("a folder; expected an image"), std::string::npos);
 }
 
 Result<SolidTextureResult> learn(const ExampleImage& example, int edge = 32) {
