@@ -12,6 +12,9 @@
 
 namespace sonocase {
 
+// An attempt with less elapsed time than this is a slip of the hand: it is scored and not kept.
+inline constexpr double kMinAttemptS = 3;
+
 // A line of a procedure's checklist as an attempt left it.
 struct CheckedItem {
     std::string name;

@@ -45,9 +45,16 @@ Result<InputScript> InputScript::load(const std::string& path) {
     return script;
 }
 
-InjectedInput InputScript::next(double now_s, std::string& shot, bool& quit) {
+bool InputScript::saves_next() const {
+    if (waiting_ > 0 || release_ || press_ > 0 || next_ >= lines_.size()) return false;
+    const std::string& verb = lines_[next_].words[0];
+    return verb == "shot" || verb == "boxes" || verb == "instructor";
+}
+
+InjectedInput InputScript::next(double now_s, bool ready, std::string& shot, bool& quit) {
     input_.wheel = 0;
     of_instructor_ = boxes_alone_ = false;
+    if (!ready && !release_) return input_;
     if (waiting_ > 0) {
         --waiting_;
         return input_;

@@ -15,7 +15,8 @@
 //   press NAME          click the control of that name (DrawnBox), wherever it is
 //   loop S              again from the first line until the clock says S seconds
 //   quit
-// A picture lasts 1/60 s for keys that are held, however long it took to draw.
+// A picture lasts 1/60 s for keys that are held, however long it took to draw. One that is saved
+// waits until all that came before is rendered.
 // Empty lines and lines that start with # are ignored.
 #pragma once
 
@@ -36,9 +37,12 @@ class InputScript {
 
     // False after the last command.
     bool active() const { return next_ < lines_.size() || waiting_ > 0 || press_ > 0; }
+    // Whether next() will ask for a picture or boxes.
+    bool saves_next() const;
     // The input of the next picture. Sets `shot` to the file in which to save that picture, and
-    // `quit` when the script ends. now_s: the clock of `loop`.
-    InjectedInput next(double now_s, std::string& shot, bool& quit);
+    // `quit` when the script ends. now_s: the clock of `loop`. ready: false repeats the input, once
+    // keys are up, and leaves the script where it is.
+    InjectedInput next(double now_s, bool ready, std::string& shot, bool& quit);
     // Whether the last next() asked for a picture of the second window.
     bool of_instructor() const { return of_instructor_; }
     // Whether it asked for the boxes alone.

@@ -406,8 +406,7 @@ void note_attempt(Progress& progress,
     training.result = attempt_result(score);
     add_trend(earlier, score, *training.result);
     progress.class_records.reset();
-    // A slip of the hand is not an attempt; the progress book leaves it out too.
-    constexpr double kMinAttemptS = 3;
+    // As the progress book does.
     if (!(score.value("elapsed_time_s") >= kMinAttemptS)) return;
     ProgressEntry entry;
     entry.trainee = progress.trainee;

@@ -149,6 +149,7 @@ void ScanThread::set_observer(FrameObserver observer) {
 
 void ScanThread::set_controls(const ScanControls& controls) {
     controls_box_.publish(controls);
+    ++controls_set_;
     wake();
 }
 
@@ -271,10 +272,15 @@ void ScanThread::count_live(const ScanFrame& out, double now_s, bool arrived) {
 
 bool ScanThread::step() {
     const std::lock_guard lock(mutex_);
+    const std::uint64_t set = controls_set_;
     take_controls();
     resting_ = !engine_ || controls_.frozen || controls_.resting;
-    if (!engine_) return false;
-    const double now_s = clock_();
+    const bool rendered = engine_ && render(clock_());
+    if (rendered || resting_) controls_shown_ = set;
+    return rendered;
+}
+
+bool ScanThread::render(double now_s) {
     const bool arrived = poll_tracker(now_s);
     if (controls_.frozen && !redraw_) return false;
     if (controls_.resting && !arrived && !redraw_) return false;

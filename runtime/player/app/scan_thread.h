@@ -3,7 +3,9 @@
 // The thread that renders: the engine with its tracker, and the Doppler modes of its frames.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -75,6 +77,10 @@ class ScanThread {
     // Runs `use` between two frames; false when there is no engine.
     bool with_engine(const std::function<void(ScanEngine&)>& use);
     void set_controls(const ScanControls& controls);
+    // How often controls were set, and how many of these refresh() and frame() show: a picture that
+    // stands still shows all that do not change it.
+    std::uint64_t controls_set() const { return controls_set_; }
+    std::uint64_t controls_shown() const { return controls_shown_; }
 
     // Window thread: true if frame() is newer than after the last call.
     bool refresh() { return frames_.refresh(); }
@@ -92,6 +98,7 @@ class ScanThread {
     // Looks for work once, under the lock; true if it rendered a frame. Its parts, in order:
     bool step();
     void take_controls();
+    bool render(double now_s);  // if a frame is due
     bool poll_tracker(double now_s);  // true: a new reading
     void render_kept(ScanFrame& out);
     void describe(ScanFrame& out, double now_s) const;
@@ -112,6 +119,7 @@ class ScanThread {
     SoundSink sound_;
     Mailbox<ScanControls> controls_box_;
     ScanControls controls_;
+    std::atomic<std::uint64_t> controls_set_ = 0, controls_shown_ = 0;
     bool redraw_ = false;
     bool resting_ = true;   // nothing is rendered until something wakes the thread
     bool waiting_ = false;  // for the tracker's first reading

@@ -32,8 +32,6 @@ std::optional<SessionReplay> session_replay(const std::string& path) {
 
 namespace {
 
-constexpr double kMinAttemptS = 3;  // shorter ones are slips of the hand
-
 // Why a frame with these events is kept as a picture; null: it is not.
 const char* picture_reason(std::span<const LiveEvent> events) {
     for (const LiveEvent& event : events) {
@@ -173,9 +171,7 @@ Result<SessionScore> SessionRun::finish() {
     options.jobs = &jobs;
     SessionScore score =
         score_session(session, exercise_, anatomy_.get(), open_.bundle->labels, options);
-    const auto& samples = session.samples;
-    const double seconds = samples.empty() ? 0 : samples.back().time_s - samples.front().time_s;
-    if (!session.header.trainee.empty() && seconds < kMinAttemptS) {
+    if (!session.header.trainee.empty() && !(score.value("elapsed_time_s") >= kMinAttemptS)) {
         score.warnings.push_back("An attempt this short is not put into the progress book.");
     } else if (!session.header.trainee.empty()) {
         // A session that cannot be added to the book still has scores: the trainee sees them, and

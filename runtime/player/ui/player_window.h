@@ -4,6 +4,8 @@
 // the parts that its pages need, and does what they ask for.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 
 #include "formats/base/result.h"
@@ -34,6 +36,8 @@ class PlayerWindow {
     void start_scanning();
     Stillness stillness(const PictureClock& clock) const;
     void show_picture(const PictureClock& clock);
+    // Whether the frame shows what was asked for before the first of these calls in a row.
+    bool all_shown();
     void keep_settings();
 
     SessionView session(const TrackerHealth& tracker) const;
@@ -86,6 +90,7 @@ class PlayerWindow {
     Requests requests_;
     Ui ui_, instructor_ui_;
     InputScript script_;
+    std::optional<std::uint64_t> awaited_;  // of ScanThread::controls_set()
     WindowStats stats_;
     int shown_ = 0;                  // pictures
     std::uint64_t shown_frame_ = 0;  // number of the frame that the texture holds

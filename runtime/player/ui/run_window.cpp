@@ -236,6 +236,14 @@ void PlayerWindow::show_pictures() {
     }
 }
 
+bool PlayerWindow::all_shown() {
+    if (!loaded_.open) return true;
+    if (!awaited_) awaited_ = loaded_.scan->controls_set();
+    if (loaded_.scan->controls_shown() < *awaited_) return false;
+    awaited_.reset();
+    return true;
+}
+
 void PlayerWindow::show_picture(const PictureClock& clock) {
     const PlayerArguments& arguments = player_.arguments;
     Notices& notices = player_.notices;
@@ -254,8 +262,9 @@ void PlayerWindow::show_picture(const PictureClock& clock) {
     const bool scripted = script_.active();
     input.active = scripted;
     // A script waits for what is made beside it, so that its pictures show the same on any machine.
-    if (scripted && !loaded.view3d->busy()) {
-        input = script_.next(now_s, shot, quit);
+    if (scripted) {
+        const bool ready = !loaded.view3d->busy() && (!script_.saves_next() || all_shown());
+        input = script_.next(now_s, ready, shot, quit);
         if (script_.of_instructor()) instructor_shot.swap(shot);
     }
     const bool pictured = !shot.empty() && !script_.boxes_alone();

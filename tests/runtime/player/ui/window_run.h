@@ -22,11 +22,11 @@ class WindowRun : public ::testing::Test {
         EXPECT_TRUE(save_bundle(bundle, bundle_));
     }
 
-    // The command line that plays the case by this script.
+    // The command line that plays the case by this script. What it does not save is not drawn.
     std::string command(const std::string& arguments,
                         const std::string& script,
                         const std::string& size = "1280x720") {
-        folder_.write("script", script);
+        folder_.write("script", "only-shots\n" + script);
         return SONOCASE_BIN "/sonoplay " + bundle_ + " --size " + size + " " + arguments +
                " --script " + (folder_ / "script");
     }
