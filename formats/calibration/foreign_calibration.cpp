@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "formats/recording/sequence.h"
+#include "formats/text/lower_case.h"
 #include "formats/text/number_text.h"
 
 namespace sonocase {
@@ -64,9 +65,7 @@ std::optional<std::vector<double>> numbers_in(std::string_view text) {
 }
 
 bool holds(std::string_view text, std::string_view word) {
-    const auto same = [](char a, char b) {
-        return std::tolower(static_cast<unsigned char>(a)) == b;
-    };
+    const auto same = [](char a, char b) { return lower_case(a) == b; };
     return std::search(text.begin(), text.end(), word.begin(), word.end(), same) != text.end();
 }
 

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "formats/recording/tool_frames.h"
+#include "formats/text/lower_case.h"
 #include "formats/text/number_text.h"
 
 namespace sonocase {
@@ -110,12 +111,6 @@ char separator_of(std::string_view line) {
     return ' ';
 }
 
-std::string lower(std::string_view text) {
-    std::string out(text);
-    for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-    return out;
-}
-
 // What stands where there is no number.
 bool is_none(std::string_view cell) {
     static constexpr std::string_view kNone[] = {
@@ -123,7 +118,7 @@ bool is_none(std::string_view cell) {
         "-1.#qna", "1.#ind", "-1.#ind", "1.#nan",   "#n/a",      "n/a",
         "na",      "null",   "none",    "-",        "--",        "missing"};
     if (cell.size() > 10) return false;
-    std::string word = lower(cell);
+    std::string word = lower_case(cell);
     if (word.starts_with("1.#") || word.starts_with("-1.#")) word.resize(word.find('#') + 4);
     return std::find(std::begin(kNone), std::end(kNone), word) != std::end(kNone);
 }
@@ -162,7 +157,7 @@ State state_of(std::string_view cell) {
                                                  "not_rigid",
                                                  "out_of_range"};
     if (cell == "OK") return State::counts;
-    const std::string word = lower(cell);
+    const std::string word = lower_case(cell);
     if (std::find(std::begin(kCounts), std::end(kCounts), word) != std::end(kCounts))
         return State::counts;
     if (is_none(cell) || std::find(std::begin(kLost), std::end(kLost), word) != std::end(kLost))
@@ -281,7 +276,7 @@ class LayoutReader {
         }
         if (name.size() == 3 && name[0] == 't') {
             at = 1;
-            from = lower(line_).find("t00") == std::string::npos ? 1 : 0;
+            from = lower_case(line_).find("t00") == std::string::npos ? 1 : 0;
         }
         if (at == std::string::npos) return name;
         const int row = name[at] - '0' - from, column = name.back() - '0' - from;
@@ -701,7 +696,7 @@ Result<std::vector<ToolReadings>> parse_pose_table(std::string_view text,
     while (!layout && !text.empty()) {
         std::string_view line = next_line(text);
         ++number;
-        if (line.empty() || lower(line.substr(0, 4)) == "sep=") continue;
+        if (line.empty() || lower_case(line.substr(0, 4)) == "sep=") continue;
         const std::string at = where + ":" + std::to_string(number);
         const bool remark = line.front() == '#' || line.front() == '%';
         if (remark) line = trimmed(line.substr(1));

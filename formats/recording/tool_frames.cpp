@@ -10,17 +10,13 @@
 #include <optional>
 #include <utility>
 
+#include "formats/text/lower_case.h"
+
 namespace sonocase {
 namespace {
 
 constexpr double kHoldS = 0.25;  // as long as a live tool may be silent
 constexpr std::array<double, 16> kIdentity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-
-std::string lower_name(std::string_view text) {
-    std::string out(text);
-    for (char& c : out) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    return out;
-}
 
 // One step of a chain of transforms.
 struct Link {
@@ -70,7 +66,7 @@ TransformName split_transform_name(std::string_view name) {
 
 int rank_as_tool(std::string_view transform, ToolRole role) {
     const TransformName name = split_transform_name(transform);
-    const std::string tool = lower_name(name.from);
+    const std::string tool = lower_case(name.from);
     const bool needle = role == ToolRole::needle;
     const auto begins = [&](std::string_view word) { return tool.starts_with(word); };
     const auto holds = [&](std::string_view word) { return tool.find(word) != std::string::npos; };
@@ -86,7 +82,7 @@ int rank_as_tool(std::string_view transform, ToolRole role) {
         rank = any(kProbeWords, begins) ? 4 : any(kProbeWords, holds) ? 3 : image ? 1 : 0;
     }
     if (rank == 0) return 0;
-    const std::string to = lower_name(name.to);
+    const std::string to = lower_case(name.to);
     // The image in the probe, or a needle's tip in the needle, is a calibration and no pose.
     const auto is_tool = [&](const auto& words) {
         return any(words,

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "formats/base/result.h"
+#include "formats/text/lower_case.h"  // for those who read tables
 
 namespace sonocase::pipeline::inline base {
 
@@ -47,7 +48,5 @@ std::optional<double> number_in(std::string_view cell);
 
 // Without white space at either end; a view of `text`.
 std::string_view trimmed(std::string_view text);
-
-std::string lower_case(std::string_view text);
 
 }  // namespace sonocase::pipeline::inline base

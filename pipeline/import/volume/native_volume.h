@@ -5,7 +5,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -20,6 +19,7 @@
 
 #include "formats/base/result.h"
 #include "formats/base/stage_report.h"
+#include "formats/text/lower_case.h"
 #include "formats/volume/label_volume.h"
 #include "pipeline/import/volume/volume_file.h"
 
@@ -99,9 +99,8 @@ struct NativeVolume {
 // Whether a path ends like this, in small or capital letters.
 inline bool has_ending(const std::string& path, std::string_view ending) {
     return path.size() >= ending.size() &&
-           std::equal(
-               ending.begin(), ending.end(), path.end() - std::ssize(ending),
-               [](char a, char b) { return a == std::tolower(static_cast<unsigned char>(b)); });
+           std::equal(ending.begin(), ending.end(), path.end() - std::ssize(ending),
+                      [](char a, char b) { return a == lower_case(b); });
 }
 inline bool is_nifti_name(const std::string& path) {
     return has_ending(path, ".nii") || has_ending(path, ".nii.gz");

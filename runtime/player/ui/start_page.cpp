@@ -2,11 +2,11 @@
 
 // The start page: cases with their pictures and exercises, where to go on, and how to open another.
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdio>
 
 #include "formats/scoring/course_standing.h"
+#include "formats/text/lower_case.h"
 #include "runtime/player/app/next_exercise.h"
 #include "runtime/player/app/settings.h"
 #include "runtime/player/ui/pages.h"
@@ -24,10 +24,7 @@ constexpr float kExercise = 52;
 using Card = std::shared_ptr<const CaseCard>;
 
 bool matches(const std::string& words, const char* search) {
-    const auto same = [](char a, char b) {
-        return std::tolower(static_cast<unsigned char>(a)) ==
-               std::tolower(static_cast<unsigned char>(b));
-    };
+    const auto same = [](char a, char b) { return lower_case(a) == lower_case(b); };
     const std::string wanted = search;
     return std::search(words.begin(), words.end(), wanted.begin(), wanted.end(), same) !=
                words.end() ||

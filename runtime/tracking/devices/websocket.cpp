@@ -7,6 +7,7 @@
 #include <bit>
 
 #include "formats/base/base64.h"
+#include "formats/text/lower_case.h"
 
 namespace sonocase::runtime::websocket {
 namespace {
@@ -52,22 +53,13 @@ Sha1 sha1(std::string_view text) {
     return out;
 }
 
-char lower(char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-}
-std::string lower(std::string_view text) {
-    std::string out(text);
-    std::transform(out.begin(), out.end(), out.begin(), [](char c) { return lower(c); });
-    return out;
-}
-
 // Value of a header field; "" if there is none.
 std::string_view field(std::string_view request, std::string_view name) {
     for (std::size_t at = request.find("\r\n"); at != request.npos;
          at = request.find("\r\n", at + 2)) {
         const std::string_view line = request.substr(at + 2, request.find("\r\n", at + 2) - at - 2);
         const std::size_t colon = line.find(':');
-        if (colon == line.npos || lower(line.substr(0, colon)) != name) continue;
+        if (colon == line.npos || lower_case(line.substr(0, colon)) != name) continue;
         std::string_view value = line.substr(colon + 1);
         while (!value.empty() && (value.front() == ' ' || value.front() == '\t'))
             value.remove_prefix(1);
@@ -145,8 +137,8 @@ std::optional<Answer> answer_of(std::string_view request, std::string_view token
         return refusal("400 Bad Request");
     const std::string_view target = line.substr(space + 1, line.size() - space - 10);
     const std::string_view key = field(request, "sec-websocket-key");
-    if (lower(field(request, "upgrade")) != "websocket" || key.size() != 24 ||
-        lower(field(request, "connection")).find("upgrade") == std::string::npos)
+    if (lower_case(field(request, "upgrade")) != "websocket" || key.size() != 24 ||
+        lower_case(field(request, "connection")).find("upgrade") == std::string::npos)
         return refusal("400 Bad Request");
     if (field(request, "sec-websocket-version") != "13")
         return Answer{
