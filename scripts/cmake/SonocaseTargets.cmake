@@ -74,8 +74,8 @@ endfunction()
 # What a room that says SMALL is compiled with: for size where the rest is compiled for speed.
 set(SONOCASE_SMALL_OPTIONS $<$<CONFIG:Release>:-Os>)
 
-# How many sources of a room are compiled as one, so that what they include is parsed once for all of them: the
-# pipeline takes about half the time. 1 while you work on one room: each is compiled by itself.
+# How many sources of a room are compiled as one, so that what they include is parsed once for all of them, which takes about
+# half the time. 1 while you work on one room: each is compiled by itself.
 set(SONOCASE_BATCH 8 CACHE STRING "Sources of a room that are compiled together; 1: each by itself")
 
 # sonocase_batch_room(TARGET): what TARGET compiles alike goes in batches. Left alone are sources with options of their own,
@@ -126,10 +126,9 @@ function(sonocase_batch_room target)
     set_source_files_properties("${batch}" PROPERTIES COMPILE_OPTIONS -Wno-subobject-linkage)
   endforeach()
 endfunction()
-# sonocase_batched(TARGET): the same, when the present folder has said all. In a release build of the pipeline alone: clang-tidy
-# is told of each source of formats and runtime how it is compiled.
-function(sonocase_batched target folder)
-  if(SONOCASE_BATCH GREATER 1 AND (SONOCASE_SANITIZE OR folder MATCHES "^pipeline"))
+# sonocase_batched(TARGET): the same, when the present folder has said all.
+function(sonocase_batched target)
+  if(SONOCASE_BATCH GREATER 1)
     cmake_language(EVAL CODE "cmake_language(DEFER CALL sonocase_batch_room ${target})")  # its name now, the call later
   endif()
 endfunction()
@@ -166,7 +165,7 @@ function(sonocase_room folder)
     add_library(${name} STATIC ${arg_SOURCES})
     target_compile_options(${name} PRIVATE ${size})
     target_precompile_headers(${name} REUSE_FROM ${headers})
-    sonocase_batched(${name} ${folder})
+    sonocase_batched(${name})
     target_include_directories(${name} PUBLIC "$<BUILD_INTERFACE:${doors}>")
     target_link_libraries(${name} PUBLIC ${PUBLIC_targets} PRIVATE sonocase_options ${PRIVATE_targets})
   else()
