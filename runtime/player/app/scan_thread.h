@@ -98,7 +98,7 @@ class ScanThread {
     // Looks for work once, under the lock; true if it rendered a frame. Its parts, in order:
     bool step();
     void take_controls();
-    bool render(double now_s);  // if a frame is due
+    bool render(double now_s);        // if a frame is due
     bool poll_tracker(double now_s);  // true: a new reading
     void render_kept(ScanFrame& out);
     void describe(ScanFrame& out, double now_s) const;

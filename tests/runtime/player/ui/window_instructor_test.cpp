@@ -111,9 +111,8 @@ TEST_F(InstructorWindow, NothingOverlapsOrIsCut) {
             SCOPED_TRACE(std::string(size) + " " + language);
             const CommandResult result =
                 run("--instructor --exercise " + (folder_ / "exam.toml"),
-                    "wait 6\nkey b\nkey n\nhold w 20\nwait 6\ninstructor " +
-                        file("during") + "\nkey b\nwait 2\nkey b\nwait 4\ninstructor " +
-                        file("after") + "\nquit\n",
+                    "wait 6\nkey b\nkey n\nhold w 20\nwait 6\ninstructor " + file("during") +
+                        "\nkey b\nwait 2\nkey b\nwait 4\ninstructor " + file("after") + "\nquit\n",
                     language, size);
             ASSERT_EQ(result.status, 0) << result.error;
             for (const char* name : {"during", "after"}) {
