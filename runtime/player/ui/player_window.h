@@ -36,7 +36,8 @@ class PlayerWindow {
     void start_scanning();
     Stillness stillness(const PictureClock& clock) const;
     void show_picture(const PictureClock& clock);
-    // Whether the frame shows what was asked for before the first of these calls in a row.
+    // Whether the frame shows what was asked for before the first of these calls in a row, and each
+    // card of a case its picture.
     bool all_shown();
     void keep_settings();
 

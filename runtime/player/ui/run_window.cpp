@@ -237,6 +237,7 @@ void PlayerWindow::show_pictures() {
 }
 
 bool PlayerWindow::all_shown() {
+    if (view_.chooser.cards && view_.chooser.cards->busy()) return false;
     if (!loaded_.open) return true;
     if (!awaited_) awaited_ = loaded_.scan->controls_set();
     if (loaded_.scan->controls_shown() < *awaited_) return false;
