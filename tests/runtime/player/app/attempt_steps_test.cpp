@@ -213,6 +213,31 @@ TEST(ChangingTheTracker, ForgetsWhatTheOneBeforeReported) {
               static_cast<long>(frame.pixels.size()));
 }
 
+// What a script's saved picture waits for: a frame that is said to show some controls does, live
+// and frozen, however fast they follow each other.
+TEST(ControlsThatAreShown, AreThoseOfTheFrame) {
+    const auto open = small_open_case();
+    EngineOptions options;
+    options.render.width_px = options.render.height_px = 64;
+    options.render.model = ImageModel::paper;
+    auto engine = ScanEngine::create(open->bundle, open->exercises[0], options);
+    ScanThread scan(session_clock(steady_seconds()));
+    scan.set_engine(std::make_unique<ScanEngine>(std::move(*engine)));
+    ScanControls controls;
+    for (int n = 1; n <= 30; ++n) {
+        controls.settings.gain_db = n % 2 ? n : -n;
+        controls.frozen = n > 15;
+        scan.set_controls(controls);
+        EXPECT_EQ(scan.controls_set(), static_cast<std::uint64_t>(n));
+        const double give_up_s = steady_seconds() + 30;
+        while (scan.controls_shown() < scan.controls_set() && steady_seconds() < give_up_s)
+            std::this_thread::yield();
+        scan.refresh();
+        EXPECT_EQ(scan.frame().record.input.settings.gain_db, controls.settings.gain_db) << n;
+        EXPECT_EQ(scan.frame().frozen, controls.frozen) << n;
+    }
+}
+
 // The set-up's table: each click gives a sensor a role, in which it takes the place of another, or
 // takes it away; a sensor without a name keeps it by its number, one with a name by that.
 TEST(GivingARole, IsKeptByNumberOrByName) {
