@@ -48,19 +48,23 @@ ResultRow row_of(const PassResult& mark) {
 
 constexpr const char* kFindTarget =
     "Find the target first: slide and tilt the probe until it lies in the middle of the picture.";
+constexpr const char* kStayInTarget =
+    "The needle reached the target and left it: hold it there and end the attempt.";
 constexpr const char* kTakeNeedle =
     "Take the needle: put it beside the probe, in the plane of the picture, and aim at the target.";
 
-// What went wrong before any mark could say it: no needle was used, or the target was not found.
-// Null: neither.
+// What went wrong before any mark could say it: no needle was used, the target was not found, or the
+// needle left a target that it had reached. Null: none of these.
 const char* earlier_fault(const SessionScore& score) {
     constexpr double kFarMm = 20, kFarLimits = 3;
     for (const PassResult& mark : score.pass_marks) {
         if (mark.metric != "final_tip_to_target_mm" || mark.passed) continue;
         const double mm = mark.value;
+        const bool near = mm <= std::max(kFarMm, kFarLimits * mark.at_most);  // false: NaN as well
+        if (near) return nullptr;
+        if (score.value("targets_hit") > 0) return kStayInTarget;
         const bool found = score.value("targets_scanned_percent") > 0;
-        if (!std::isfinite(mm)) return found ? kTakeNeedle : kFindTarget;
-        if (mm > std::max(kFarMm, kFarLimits * mark.at_most)) return kFindTarget;
+        return found && !std::isfinite(mm) ? kTakeNeedle : kFindTarget;
     }
     return nullptr;
 }

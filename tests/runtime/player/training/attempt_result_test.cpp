@@ -51,17 +51,21 @@ TEST(AttemptResult, ShowsTheWorstMissFirstAndSaysWhatToDo) {
 
 // What went wrong first is said first: not to stop in the middle of what was never found.
 TEST(AttemptResult, TheAdviceFitsWhatHappened) {
-    const auto advice = [](double mm, double scanned) {
+    const auto advice = [](double mm, double scanned, double hit = 0) {
         return std::string(
             attempt_result(score_with({{"final_tip_to_target_mm", mm, 5, -INFINITY, mm <= 5}},
-                                      {{"targets_scanned_percent", scanned}}))
+                                      {{"targets_scanned_percent", scanned}, {"targets_hit", hit}}))
                 .advice);
     };
     EXPECT_EQ(advice(NAN, 0).rfind("Find the target first", 0), 0u);
     EXPECT_EQ(advice(NAN, 100).rfind("Take the needle", 0), 0u);
     EXPECT_EQ(advice(54, 100).rfind("Find the target first", 0), 0u);
     EXPECT_EQ(advice(8, 100).rfind("Stop in the middle", 0), 0u);
-    EXPECT_EQ(advice(3, 100), "");
+    EXPECT_EQ(advice(3, 100, 1), "");
+    // The tip was in the target: to find it would be the wrong advice, pulled out or gone on.
+    EXPECT_EQ(advice(8, 100, 1).rfind("Stop in the middle", 0), 0u);
+    for (const double mm : {54.0, double{NAN}})
+        EXPECT_EQ(advice(mm, 100, 1).rfind("The needle reached the target and left it", 0), 0u);
 }
 
 // Eight marks, of which the last alone is missed: "7 of 8 marks reached" stands over all eight.
