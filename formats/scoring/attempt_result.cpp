@@ -53,8 +53,8 @@ constexpr const char* kStayInTarget =
 constexpr const char* kTakeNeedle =
     "Take the needle: put it beside the probe, in the plane of the picture, and aim at the target.";
 
-// What went wrong before any mark could say it: no needle was used, the target was not found, or the
-// needle left a target that it had reached. Null: none of these.
+// What went wrong before any mark could say it: no needle was used, the target was not found, or
+// the needle left a target that it had reached. Null: none of these.
 const char* earlier_fault(const SessionScore& score) {
     constexpr double kFarMm = 20, kFarLimits = 3;
     for (const PassResult& mark : score.pass_marks) {

@@ -3,13 +3,20 @@
 // What goes into a frame, and what is reported about it afterwards.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 #include "formats/base/geometry.h"
 #include "formats/exercise/procedure.h"
 
 namespace sonocase::runtime {
+
+// A control as it is used: within its range, and `otherwise` where it is no number.
+inline double setting_within(double value, double low, double high, double otherwise) {
+    return std::isfinite(value) ? std::clamp(value, low, high) : otherwise;
+}
 
 enum class DopplerMode : std::uint8_t { off, colour, power, spectral, m_mode };
 

@@ -12,10 +12,6 @@ namespace {
 
 constexpr double kMaxSteerDeg = 30;
 
-double within(double value, double low, double high, double otherwise) {
-    return std::isfinite(value) ? std::clamp(value, low, high) : otherwise;
-}
-
 }  // namespace
 
 ColourBox::Beam ColourBox::beam(double line) const {
@@ -46,10 +42,12 @@ ColourBox colour_box(const ScanGeometry& geometry, const DopplerSettings& s) {
     box.line_step = 2 * geometry.half_extent / kColourLines;
     box.row_mm = geometry.depth_mm / kColourRows;
     if (!geometry.fan)
-        box.steer_tan = std::tan(within(s.steer_deg, -kMaxSteerDeg, kMaxSteerDeg, 0) * kPi / 180);
-    const double left = within(s.box_left, 0, 1, 0), right = within(s.box_right, 0, 1, 1);
-    const double top = within(s.box_top_mm, 0, geometry.depth_mm, 0),
-                 bottom = within(s.box_bottom_mm, 0, geometry.depth_mm, geometry.depth_mm);
+        box.steer_tan =
+            std::tan(setting_within(s.steer_deg, -kMaxSteerDeg, kMaxSteerDeg, 0) * kPi / 180);
+    const double left = setting_within(s.box_left, 0, 1, 0),
+                 right = setting_within(s.box_right, 0, 1, 1);
+    const double top = setting_within(s.box_top_mm, 0, geometry.depth_mm, 0),
+                 bottom = setting_within(s.box_bottom_mm, 0, geometry.depth_mm, geometry.depth_mm);
     box.first_line = static_cast<int>(std::lround(left * kColourLines));
     box.lines = static_cast<int>(std::lround(right * kColourLines)) - box.first_line;
     box.first_row = static_cast<int>(std::lround(top / box.row_mm));

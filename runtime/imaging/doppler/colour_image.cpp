@@ -17,10 +17,6 @@ constexpr float kShadowMm = 2;
 constexpr std::array<float, 3> kAcross{0.4917f, 0.2251f, 0.0290f};
 constexpr std::array<float, 4> kAlong{0.3330f, 0.2353f, 0.0830f, 0.0152f};
 
-double clean(double value, double low, double high, double otherwise) {
-    return std::isfinite(value) ? std::clamp(value, low, high) : otherwise;
-}
-
 float power_of(double db) {
     return static_cast<float>(std::pow(10.0, db / 10));
 }
@@ -32,7 +28,7 @@ double colour_frame_hz(const ColourBox& box,
                        double frequency_mhz,
                        double depth_mm,
                        int grey_lines) {
-    const double nyquist = 10 * clean(settings.scale_cm_s, 1, 500, 30);
+    const double nyquist = 10 * setting_within(settings.scale_cm_s, 1, 500, 30);
     const double prf = 4 * frequency_mhz * 1e6 * nyquist / kSpeedOfSoundMmPerS;
     const double grey_s = grey_lines * 2 * depth_mm / kSpeedOfSoundMmPerS;
     const double colour_s = box.lines * std::clamp(settings.ensemble, 4, kMaxPulses) / prf;
@@ -125,7 +121,7 @@ void ColourImage::find_shadow(const TissuePlace& place) {
 bool ColourImage::find_flash(const DopplerSettings& settings, const TissuePlace& place) {
     const int across = (box_.lines + kBlockLines - 1) / kBlockLines,
               down = (box_.rows + kBlockRows - 1) / kBlockRows;
-    const double nyquist = 10 * clean(settings.scale_cm_s, 1, 500, 30);
+    const double nyquist = 10 * setting_within(settings.scale_cm_s, 1, 500, 30);
     const WallFilter filter(settings.wall_filter);
     const float tissue = power_of(kTissueDb), min_power = 0.01f * power_of(kNoiseDb + kShownDb);
     bool flash = false;
@@ -189,7 +185,7 @@ void ColourImage::sample_block(Block& block,
     const int near = scene_.near(middle, std::sqrt(reach) + 1, box_capsules_, block_capsules_);
     if (near == 0 && field_ == nullptr) return;
     const auto among = std::span<const std::int32_t>(block_capsules_).first(near);
-    const auto nyquist = static_cast<float>(10 * clean(settings.scale_cm_s, 1, 500, 30));
+    const auto nyquist = static_cast<float>(10 * setting_within(settings.scale_cm_s, 1, 500, 30));
     const WallFilter filter(settings.wall_filter);
     const bool presses = place.presses();
     for (int r = 0; r < block.rows; ++r)
@@ -342,7 +338,7 @@ ColourReport ColourImage::render(const DopplerSettings& settings,
             any = true;
         }
     if (any) blur();
-    if (any || clean(settings.gain_db, -30, 30, 0) > 2) {
+    if (any || setting_within(settings.gain_db, -30, 30, 0) > 2) {
         estimate(settings, moment);
         paint(settings, grey, overlay);
     }
@@ -370,13 +366,13 @@ inline const float* ColourImage::draws(std::uint32_t cell, std::uint32_t frame) 
 
 void ColourImage::estimate(const DopplerSettings& settings, const ColourMoment& moment) {
     const Ensemble ensemble(settings.ensemble);
-    const double gain = clean(settings.gain_db, -30, 30, 0);
+    const double gain = setting_within(settings.gain_db, -30, 30, 0);
     const auto shown = static_cast<float>(std::pow(10.0, (kShownDb - gain) / 10)) * ensemble.r0;
     // Below the threshold by more than noise can lift it, nothing is worked out.
     const bool noise_shows = gain > 2;
     const int persistence = std::clamp(settings.persistence, 1, kMaxPersisted);
     const float weight = 1 / std::sqrt(static_cast<float>(persistence));
-    const float baseline = static_cast<float>(clean(settings.baseline, -0.9, 0.9, 0)) / 2;
+    const float baseline = static_cast<float>(setting_within(settings.baseline, -0.9, 0.9, 0)) / 2;
     const float full = power_of(12);  // power that is drawn brightest, above the threshold
     for (int row = 0; row < box_.rows; ++row) {
         const float noise = noise_[box_.first_row + row], threshold = shown * noise;
@@ -418,7 +414,8 @@ void ColourImage::estimate(const DopplerSettings& settings, const ColourMoment& 
 void ColourImage::paint(const DopplerSettings& settings,
                         std::span<const std::uint8_t> grey,
                         std::span<std::uint8_t> overlay) const {
-    const int priority = static_cast<int>(std::lround(255 * clean(settings.priority, 0, 1, 0.5)));
+    const int priority =
+        static_cast<int>(std::lround(255 * setting_within(settings.priority, 0, 1, 0.5)));
     const bool wraps = settings.mode != DopplerMode::power;
     for (int k = -1; k < box_.rows; ++k) {
         if (box_.first_row + k < 0) continue;

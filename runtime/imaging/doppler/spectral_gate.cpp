@@ -14,10 +14,6 @@ namespace {
 constexpr int kMaxPoints = 1024;
 constexpr double kChordReachMm = 30, kChordStepMm = 0.1;
 
-double clean(double value, double low, double high, double otherwise) {
-    return std::isfinite(value) ? std::clamp(value, low, high) : otherwise;
-}
-
 Float3 float3(Vector3 v) {
     return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
 }
@@ -42,9 +38,10 @@ GateContent SpectralGate::aim(const ScanGeometry& geometry,
     vessel_ = -1;
     asked_ = std::clamp(settings.gate_points, 8, kMaxPoints);
     const ColourBox lines = colour_box(geometry, settings);
-    const double line = clean(settings.gate_line, 0, 1, 0.5) * kColourLines - 0.5;
-    const double depth = clean(settings.gate_depth_mm, 0, geometry.depth_mm, geometry.depth_mm / 2),
-                 gate = clean(settings.gate_mm, 0.5, 30, 3);
+    const double line = setting_within(settings.gate_line, 0, 1, 0.5) * kColourLines - 0.5;
+    const double depth = setting_within(settings.gate_depth_mm, 0, geometry.depth_mm,
+                                        geometry.depth_mm / 2),
+                 gate = setting_within(settings.gate_mm, 0.5, 30, 3);
     const PlanePoint d = lines.direction(line);
     const double slant = lines.fan ? 1 : 1 / d.z;  // a steered line is longer than its depth
     const auto shown = [&](double r, double aside) {
@@ -133,7 +130,8 @@ void SpectralGate::spectrum(const DopplerSettings& settings,
                             Spectrum& out) {
     out.fill(0);
     blood_.begin(phase, inspired);
-    const auto nyquist = static_cast<float>(10 * clean(settings.spectral_scale_cm_s, 1, 1000, 100));
+    const auto nyquist =
+        static_cast<float>(10 * setting_within(settings.spectral_scale_cm_s, 1, 1000, 100));
     const WallFilter filter(settings.wall_filter);
     const float each = 1 / static_cast<float>(asked_);
     for (std::size_t i = 0; i < count_; ++i) {

@@ -17,10 +17,6 @@ constexpr int kEnvelopeLines = 5;
 constexpr float kAboveNoise = 4;
 constexpr int kMaxHop = 1024;
 
-double clean(double value, double low, double high, double otherwise) {
-    return std::isfinite(value) ? std::clamp(value, low, high) : otherwise;
-}
-
 float noise_per_bin() {
     static const float noise = static_cast<float>(std::pow(10.0, kSpectralNoiseDb / 10) / kBins);
     return noise;
@@ -121,8 +117,8 @@ void SpectralStrip::advance(const DopplerSettings& settings,
     }
     if (settings != settings_) measured_from_ = last_ + 1;
     settings_ = settings;
-    nyquist_mm_s_ = 10 * clean(settings.spectral_scale_cm_s, 1, 1000, 100);
-    baseline_ = clean(settings.baseline, -0.9, 0.9, 0) / 2;
+    nyquist_mm_s_ = 10 * setting_within(settings.spectral_scale_cm_s, 1, 1000, 100);
+    baseline_ = setting_within(settings.baseline, -0.9, 0.9, 0) / 2;
     sound_hz_ = 4 * frequency_mhz_ * 1e6 * nyquist_mm_s_ / kSpeedOfSoundMmPerS;
     const int before = content_.vessel;
     content_ = gate_.aim(geometry_, settings, place);
@@ -151,7 +147,7 @@ void SpectralStrip::make_line(const DopplerSettings& settings,
     for (std::uint32_t i = 0; i < 2 * kBins; ++i)
         n[i] = normal(key + i * 0x9E3779B9u) * 0.70710678f;
     constexpr float kSide = 0.40824829f, kMiddle = 0.81649658f;  // [.5 1 .5] / sqrt(1.5)
-    const double gain = std::pow(10.0, clean(settings.gain_db, -30, 30, 0) / 10);
+    const double gain = std::pow(10.0, setting_within(settings.gain_db, -30, 30, 0) / 10);
     const float top = decibels(static_cast<float>(1.0 / 32 / gain));
     StripLine& line = lines_[number % kStripLines];
     line.number = number;
@@ -259,7 +255,7 @@ void SpectralStrip::add_sound() {
 
 SpectralMeasures SpectralStrip::measures() const {
     SpectralMeasures m;
-    const double angle = clean(settings_.angle_deg, -80, 80, 60) * kPi / 180;
+    const double angle = setting_within(settings_.angle_deg, -80, 80, 60) * kPi / 180;
     const double cosine = std::cos(angle), sine = std::abs(std::sin(angle));
     const double raw = 2 * nyquist_mm_s_ / 10 / cosine;
     const auto corrected = [&](double turns) {
