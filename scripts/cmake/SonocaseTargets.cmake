@@ -37,6 +37,9 @@ target_compile_options(sonocase_options INTERFACE
 if(SONOCASE_SANITIZE)
   add_compile_options(-fsanitize=${SONOCASE_SANITIZE} -fno-omit-frame-pointer
                       -fno-sanitize-recover=undefined)
+  if(SONOCASE_SANITIZE_OMITTED)
+    add_compile_options(-fno-sanitize=${SONOCASE_SANITIZE_OMITTED})
+  endif()
   add_link_options(-fsanitize=${SONOCASE_SANITIZE})
 endif()
 # Adds scripts/cmake/keep_modules.c to a program; that file says why. By a library of its own: a program with a source in C
@@ -193,7 +196,7 @@ function(sonocase_precompiled target)
   target_precompile_headers(${target} PRIVATE ${ARGN})
   # What ccache knows it by, since its bytes differ from one folder to the next: compiler, options and content.
   file(WRITE "${CMAKE_CURRENT_BINARY_DIR}/CMakeFiles/${target}.dir/cmake_pch.hxx.gch.sum"
-       "${CMAKE_CXX_COMPILER_VERSION} ${CMAKE_BUILD_TYPE} ${SONOCASE_SANITIZE} ${target} ${ARGN}\n")
+       "${CMAKE_CXX_COMPILER_VERSION} ${CMAKE_BUILD_TYPE} ${SONOCASE_SANITIZE} ${SONOCASE_SANITIZE_OMITTED} ${target} ${ARGN}\n")
 endfunction()
 
 # How many test sources of a program are compiled as one: what they include is parsed, and what they have in common instantiated,
