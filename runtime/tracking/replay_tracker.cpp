@@ -365,9 +365,13 @@ bool PacedTracker::poll(double now_s, TrackerReading& reading) {
     }
     const double jump_s = jump_s_.exchange(0);
     if (jump_s != 0) inner_->expect_jump();
-    inner_s_ += (now_s - last_s_) * speed_ + jump_s;
-    last_s_ = now_s;
     const double duration = inner_->duration_s();
+    // Of this round: a time that is a little less, since that of the end is the start of the next.
+    const double end_s =
+        duration > 0 ? (std::floor(inner_s_ / duration) + 1) * duration - 1e-6 : inner_s_;
+    inner_s_ += (now_s - last_s_) * speed_ + jump_s;
+    if (stands_at_end_) inner_s_ = std::min(inner_s_, end_s);
+    last_s_ = now_s;
     // A jump back beyond the start goes on from the end, as in a loop.
     if (inner_s_ < 0) inner_s_ = duration > 0 ? duration + std::fmod(inner_s_, duration) : 0;
     at_s_ = duration > 0 ? std::fmod(inner_s_, duration) : 0;

@@ -80,6 +80,8 @@ class PacedTracker final : public Tracker {
     // Forward, or back where seconds < 0, with the next poll.
     void jump(double seconds) { jump_s_.fetch_add(seconds); }
     double at_s() const { return at_s_.load(); }  // in [0, duration_s()), at the last poll
+    // Whether it stands still at its end, where it would start over.
+    void stand_at_end(bool stand) { stands_at_end_ = stand; }
 
     bool poll(double now_s, TrackerReading& reading) override;
     TrackerHealth health() const override { return inner_->health(); }
@@ -93,6 +95,7 @@ class PacedTracker final : public Tracker {
   private:
     std::unique_ptr<Tracker> inner_;
     std::atomic<double> speed_{1}, jump_s_{0}, at_s_{0};
+    std::atomic<bool> stands_at_end_{false};
     bool started_ = false;
     double last_s_ = 0, inner_s_ = 0;
 };

@@ -165,6 +165,9 @@ void start_attempt(
         set_exact(player, loaded, scan.console, false);
         return;
     }
+    // A script that started over would pull the needle out of the target that it has reached.
+    if (scan.tracker.paced && scan.tracker.spec.starts_with("sweep:"))
+        scan.tracker.paced->stand_at_end(true);
     training.attempt = std::make_shared<Attempt>(*loaded.open, exercise, std::move(*run), started);
     training.score.reset();
     training.result.reset();
@@ -180,6 +183,7 @@ void finish_attempt(PlayerState& player, CaseState& loaded, ScanState& scan) {
     Training& training = scan.training;
     if (!training.attempt) return;
     const std::shared_ptr<Attempt> attempt = std::move(training.attempt);
+    if (scan.tracker.paced) scan.tracker.paced->stand_at_end(false);
     observe_frames(nullptr, scan.servers, *loaded.scan);
     set_exact(player, loaded, scan.console, false);
     Result<SessionScore> score = attempt->finish();
