@@ -275,6 +275,25 @@ TEST_F(WindowMended, AnAttemptOfASecondIsNotPutIntoTheBook) {
     EXPECT_EQ(sessions_in(folder_ / "data/sonocase/progress.sqlite"), 1u);
 }
 
+// A script of 2 s in an attempt of at least 3.3 s: it stays where it ends, and so does the needle.
+TEST_F(WindowMended, AScriptStandsAtItsEndInAnAttempt) {
+    const std::string file = folder_ / "script.igs.mha";
+    ASSERT_EQ(run("--tracker sweep:along --record " + file, "wait 200\nquit\n").status, 0);
+    const std::vector<SessionSample> recorded = samples(file);
+    ASSERT_GT(recorded.size(), 2u);
+    const auto way_mm = [&](const SessionSample& sample) {
+        return norm(sample.mannequin_from_probe.translation -
+                    recorded.front().mannequin_from_probe.translation);
+    };
+    double farthest_mm = 0;
+    for (const SessionSample& sample : recorded) {
+        EXPECT_GE(way_mm(sample), farthest_mm - 1) << sample.time_s;
+        farthest_mm = std::max(farthest_mm, way_mm(sample));
+    }
+    EXPECT_GT(farthest_mm, 10);
+    EXPECT_GT(recorded.back().time_s - recorded.front().time_s, 2.5);
+}
+
 // A long title is shown on two lines where it is read, and with an ellipsis elsewhere; no letter is
 // cut in two.
 TEST_F(WindowMended, ALongTitleEndsInAnEllipsisAndNothingElseMoves) {
