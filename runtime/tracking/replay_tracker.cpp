@@ -366,7 +366,7 @@ bool PacedTracker::poll(double now_s, TrackerReading& reading) {
     const double jump_s = jump_s_.exchange(0);
     if (jump_s != 0) inner_->expect_jump();
     const double duration = inner_->duration_s();
-    // Of this round: a time that is a little less, since that of the end is the start of the next.
+    // This round ends a little early, because the next one starts at the time of its end.
     const double end_s =
         duration > 0 ? (std::floor(inner_s_ / duration) + 1) * duration - 1e-6 : inner_s_;
     inner_s_ += (now_s - last_s_) * speed_ + jump_s;

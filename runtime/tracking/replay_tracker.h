@@ -80,7 +80,7 @@ class PacedTracker final : public Tracker {
     // Forward, or back where seconds < 0, with the next poll.
     void jump(double seconds) { jump_s_.fetch_add(seconds); }
     double at_s() const { return at_s_.load(); }  // in [0, duration_s()), at the last poll
-    // Whether it stands still at its end, where it would start over.
+    // true: from its end on it stands still; false, as at first: it starts over.
     void stand_at_end(bool stand) { stands_at_end_ = stand; }
 
     bool poll(double now_s, TrackerReading& reading) override;

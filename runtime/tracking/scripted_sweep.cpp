@@ -108,9 +108,11 @@ ScriptedSweep::ScriptedSweep(Sweep sweep, const Skin& skin, bool loop)
 }
 
 void ScriptedSweep::add_acts(double t, ActList& acts) {
+    // PacedTracker stops a little before the end, and the last key's acts are performed there.
+    constexpr double kEarlyS = 1e-5;
     while (acted_ < sweep_.keys.size()) {
         const SweepKey& key = sweep_.keys[acted_];
-        if (key.time_s - sweep_.keys.front().time_s > t) break;
+        if (key.time_s - sweep_.keys.front().time_s > t + kEarlyS) break;
         // What does not fit comes with the next reading.
         if (acts.count + key.acts.count > ActList::kMaxActs) break;
         for (int i = 0; i < key.acts.count; ++i)

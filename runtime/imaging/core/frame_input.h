@@ -13,7 +13,7 @@
 
 namespace sonocase::runtime {
 
-// A control as it is used: within its range, and `otherwise` where it is no number.
+// Returns the value of a control, brought into its range, or `otherwise` if it is not finite.
 inline double setting_within(double value, double low, double high, double otherwise) {
     return std::isfinite(value) ? std::clamp(value, low, high) : otherwise;
 }

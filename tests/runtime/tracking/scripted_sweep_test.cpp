@@ -96,19 +96,23 @@ TEST(ScriptedSweep, EndsOrLoops) {
 TEST(ScriptedSweep, StandsAtItsEndWhereItIsAskedTo) {
     const CaseBundle bundle = sonocase::testing::small_case();
     const Skin skin(bundle);
-    const Sweep sweep = sonocase::testing::small_exercise().sweeps[0];
+    Sweep sweep = sonocase::testing::small_exercise().sweeps[0];
+    sweep.keys.back().acts.add({ActKind::inject, 0, 1});  // performed at the very end, and once
     const double end_s = sweep.keys.back().time_s;
     const Point3 last = face(sweep_pose(sweep, end_s, &skin));
     PacedTracker paced(std::make_unique<ScriptedSweep>(sweep, skin, true));
     TrackerReading reading;
+    int acts = 0;
     const auto place_at = [&](double now_s) {
         EXPECT_TRUE(paced.poll(now_s, reading));
+        acts += reading.acts.count;
         return Point3{} + reading.sensors[kProbeSensor].world_from_sensor.translation;
     };
     place_at(10);
     place_at(12.5);  // in the second round
     paced.stand_at_end(true);
     for (const double now_s : {14.2, 15.0, 60.0}) EXPECT_LT(distance(place_at(now_s), last), 1e-3);
+    EXPECT_EQ(acts, 1);
     paced.stand_at_end(false);
     const Point3 first = face(sweep_pose(sweep, sweep.keys.front().time_s, &skin));
     EXPECT_LT(distance(place_at(60.00001), first), 1e-2);
