@@ -165,7 +165,7 @@ void start_attempt(
         set_exact(player, loaded, scan.console, false);
         return;
     }
-    // A script that started over would pull the needle out of the target that it has reached.
+    // A script that started over would begin another puncture, and that one would be scored.
     if (scan.tracker.paced && scan.tracker.spec.starts_with("sweep:"))
         scan.tracker.paced->stand_at_end(true);
     training.attempt = std::make_shared<Attempt>(*loaded.open, exercise, std::move(*run), started);

@@ -92,7 +92,7 @@ TEST(ScriptedSweep, EndsOrLoops) {
     EXPECT_EQ(round.health().phase, TrackerPhase::streaming);
 }
 
-// An attempt goes on after its script: a script that started over would pull the needle out again.
+// An attempt may outlast its script: if the script started over, its next puncture would be scored.
 TEST(ScriptedSweep, StandsAtItsEndWhereItIsAskedTo) {
     const CaseBundle bundle = sonocase::testing::small_case();
     const Skin skin(bundle);
