@@ -282,15 +282,19 @@ Status check_memory(const MemoryNeed& need, double limit_mb) {
 
 namespace {
 
-// What one stage takes alone was read off its own clock: the program's start and end, the fit, one
-// refit to half of the readings, one texture.
-constexpr double kProgramS = 0.8, kFitS = 2.6, kRefitS = 0.27, kRefitOfQuadraticS = 0.2,
-                 kTextureS = 0.1;
+// What one stage takes alone was read off its own clock: the program's start and end, the fit of
+// any case, of a scan and of an analytic body, whose mannequin is a quadratic away, one refit to
+// half of the readings, one texture.
+constexpr double kProgramS = 0.8, kFitS = 2.6, kFitOfScanS = 3.1, kFitOfQuadraticS = 2.3,
+                 kRefitS = 0.27, kRefitOfQuadraticS = 0.2, kTextureS = 0.1;
 // Relative least squares over 26 builds (docs/farm.md). For a million cooked voxels in the body and
 // in its surfaces, for a million faces of the map, and for a million nodes between thick slices,
 // beyond some, where there are as many surfaces as in a torso.
 constexpr double kVolumeS = 0.258, kSurfaceS = 4.13, kFaceS = 3.2, kBetweenS = 0.51,
                  kBetweenFrom = 4;
+// A case on its own skin: the share of the cooked voxels' seconds that it does without, since none
+// goes through a warp, and seconds that no stage accounts for. Fitted to eleven builds.
+constexpr double kUnwarpedShare = 0.2, kOwnSkinS = 1.0;
 // For a million voxels of a region.
 constexpr double kRegionS = 0.1003;
 // A map from a file, for a million voxels beyond some, to 210 million.
@@ -327,6 +331,12 @@ double probe_processor_seconds(int copies) {
     return (processor_seconds() - before) / copies;
 }
 
+// Cooked voxels in the body and in its surfaces.
+double voxels_s(const CaseSize& size) {
+    return kVolumeS * size.body_mm3 / std::pow(size.cooked_mm, 3) / 1e6 +
+           kSurfaceS * size.surface_mm2 / (size.cooked_mm * size.cooked_mm) / 1e6;
+}
+
 }  // namespace
 
 BuildTime build_time(const CaseSize& size, int texture_edge, double speed, int threads) {
@@ -334,13 +344,11 @@ BuildTime build_time(const CaseSize& size, int texture_edge, double speed, int t
                  mapped = size.sampling_s > 0 || size.mesh_voxels > 0
                               ? 0
                               : size.label_voxels * std::min(1.0, size.surface_share());
-    const double body = size.body_mm3 / std::pow(size.cooked_mm, 3) / 1e6,
-                 surface = size.surface_mm2 / (size.cooked_mm * size.cooked_mm) / 1e6;
     BuildTime time;
     time.processor_s =
         speed *
         (kProgramS + kFitS + kTextureS * std::pow(texture_edge / 64.0, 3) * size.textures +
-         kVolumeS * body + kSurfaceS * surface + kFaceS * size.surfaces +
+         voxels_s(size) + kFaceS * size.surfaces +
          kBetweenS * std::max(0.0, size.interpolated_nodes * size.surface_share() - kBetweenFrom) +
          kRegionS * size.region_voxels + kMappedS * std::max(0.0, mapped - kMappedFrom) +
          size.sampling_s + (kLesionS * size.lesions + kPoolS * size.pools) * cooked +
@@ -363,12 +371,16 @@ BuildTime build_time(
     const RegisterOptions& fit = recipe.settings.of<RegisterOptions>();
     const bool fitted =
         !recipe.inputs.own_skin && !(recipe.inputs.analytic && recipe.inputs.torso.known_map);
-    // The mannequin of an analytic body is a quadratic away, which mostly suffices.
-    const double refit_s = (recipe.inputs.analytic ? kRefitOfQuadraticS : kRefitS) +
-                           (size.mesh_voxels > 0 ? kElasticRefitS : 0);
-    const double more_s = speed * (!fitted                   ? -kFitS
-                                   : fit.uncertainty == "on" ? refit_s * fit.refits
-                                                             : 0);
+    double more_s = -kFitS;
+    if (fitted) {
+        more_s += recipe.inputs.analytic ? kFitOfQuadraticS : kFitOfScanS;
+        if (fit.uncertainty == "on")
+            more_s += fit.refits * ((recipe.inputs.analytic ? kRefitOfQuadraticS : kRefitS) +
+                                    (size.mesh_voxels > 0 ? kElasticRefitS : 0));
+    } else if (recipe.inputs.own_skin) {
+        more_s += kOwnSkinS - kUnwarpedShare * voxels_s(now);
+    }
+    more_s *= speed;
     const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
     time.processor_s += more_s;
     time.alone_s += more_s / (threads > 0 ? std::min(threads, cores) : cores);

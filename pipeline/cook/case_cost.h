@@ -52,8 +52,9 @@ struct BuildTime {
 // more than 4; p what it takes to sample an analytic body; N millions of voxels of a map from a
 // file, where they are more than 3; M those that organ meshes become; L lesions and P pools of free
 // fluid in C millions of cooked voxels; f the fit, which a known map and the patient's own skin do
-// without. A fit that needs the elastic warp takes some 1 to 3 s more and each refit 0.5, which is
-// not known beforehand but of organ meshes, whose mannequin is another body's.
+// without. On its own skin b and s are a fifth less, and a second is added. A fit that needs the
+// elastic warp takes some 1 to 3 s more and each refit 0.5, which is not known beforehand but of
+// organ meshes, whose mannequin is another body's.
 //
 // speed: machine_speed(); threads: 0 for all cores.
 BuildTime build_time(const CaseSize& size, int texture_edge, double speed, int threads);
