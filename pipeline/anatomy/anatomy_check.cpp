@@ -255,17 +255,21 @@ class Match {
             precision[c + 1] = 1 / (spread * spread);
         }
         prior[m + 1] = sign * size;
+        std::vector<double> variances(seen_.size());  // 0: the label says nothing
+        for (std::size_t i = 0; i < seen_.size(); ++i)
+            if (const ModelStructure* s = names_[i]; s != nullptr && !seen_[i].says_nothing(*s, r))
+                variances[i] = variance(seen_[i], *s, r, m, size, voxel_[r]);
         Eigen::Vector4d b = prior;
         constexpr int kRounds = 7;
         for (int round = 0; round < kRounds; ++round) {
             Eigen::Matrix4d normal = precision.asDiagonal();
             Eigen::Vector4d right = precision.cwiseProduct(prior);
             for (std::size_t i = 0; i < seen_.size(); ++i) {
-                const ModelStructure* s = names_[i];
-                if (s == nullptr || seen_[i].says_nothing(*s, r)) continue;
-                const Eigen::Vector4d u(1, s->at.x, s->at.y, s->at.z);
+                const double v = variances[i];
+                if (v == 0) continue;
+                const Vector3 at = names_[i]->at;
+                const Eigen::Vector4d u(1, at.x, at.y, at.z);
                 const double x = seen_[i].label->centre[r];
-                const double v = variance(seen_[i], *s, r, m, size, voxel_[r]);
                 double w = 1 / v;
                 if (round > 0) {
                     const double d = x - u.dot(b);
