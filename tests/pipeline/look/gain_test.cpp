@@ -11,6 +11,7 @@
 #include "look_clip.h"
 #include "pipeline/look/look.h"
 #include "pipeline/look/look_frames.h"
+#include "support/whole_sets.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -159,7 +160,10 @@ std::string case_name(const ::testing::TestParamInfo<GainCase>& tested) {
     return name;
 }
 
-INSTANTIATE_TEST_SUITE_P(Machines, LookGain, ::testing::ValuesIn(gain_cases()), case_name);
+INSTANTIATE_TEST_SUITE_P(Machines,
+                         LookGain,
+                         ::testing::ValuesIn(sonocase::testing::half_of(gain_cases())),
+                         case_name);
 
 TEST(LookNearField, DarknessAndRingingAtTheFaceAreToldApart) {
     const LookResult r = look_at({"", Machine{}, clip_fan(), 6, 1, true});
