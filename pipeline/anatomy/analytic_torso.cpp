@@ -122,13 +122,37 @@ LabelVolume sample_analytic_torso(const Grid& grid, const AnalyticBody& body) {
         });
         return out;
     }
+    const auto& solids = anatomy_of(body).solids;
+    constexpr double kRoundingMm = 1e-6;  // of places along a row of a turned grid
     parallel_for(grid.size.z, 1, [&](std::size_t begin, std::size_t end) {
+        std::vector<const Solid*> near;  // whose boxes a row of voxels goes through, the last first
         for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k) {
             for (int j = 0; j < grid.size.y; ++j) {
+                const auto point = [&](int i) {
+                    return standard_point(
+                        grid.point_from_voxel({static_cast<double>(i), static_cast<double>(j),
+                                               static_cast<double>(k)}),
+                        body);
+                };
+                Box3 row;
+                row.include(point(0));
+                row.include(point(grid.size.x - 1));
+                near.clear();
+                for (auto it = solids.rbegin(); it != solids.rend(); ++it)
+                    if (row.upper.y >= it->box.lower.y - kRoundingMm &&
+                        row.lower.y <= it->box.upper.y + kRoundingMm &&
+                        row.upper.z >= it->box.lower.z - kRoundingMm &&
+                        row.lower.z <= it->box.upper.z + kRoundingMm)
+                        near.push_back(&*it);
                 for (int i = 0; i < grid.size.x; ++i) {
-                    const Point3 p = grid.point_from_voxel(
-                        {static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)});
-                    out.voxels[grid.index(i, j, k)] = analytic_torso_label(p, body);
+                    const Point3 p = point(i);
+                    std::uint8_t& label = out.voxels[grid.index(i, j, k)];
+                    if (!inside(solids.front(), p, body.belly_mm)) continue;
+                    for (const Solid* solid : near) {
+                        if (!inside(*solid, p, body.belly_mm)) continue;
+                        label = static_cast<std::uint8_t>(solid->label);
+                        break;
+                    }
                 }
             }
         }

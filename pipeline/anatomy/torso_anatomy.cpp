@@ -50,18 +50,19 @@ Point3 trunk_point(double theta, double z, double depth_mm, double belly_mm) {
 
 namespace {
 
-double capsule_distance(Point3 p, Point3 a, Point3 b) {
+double squared_distance_to_segment(Point3 p, Point3 a, Point3 b) {
     const Vector3 ab = b - a;
     const double t = std::clamp(dot(p - a, ab) / dot(ab, ab), 0.0, 1.0);
-    return distance(p, a + t * ab);
+    const Vector3 off = p - (a + t * ab);
+    return dot(off, off);
 }
 
 double tube_distance(const Tube& tube, Point3 p) {
-    double best = INFINITY;
+    double best2 = INFINITY;
     for (std::size_t i = 0; i + 1 < tube.path.size(); ++i) {
-        best = std::min(best, capsule_distance(p, tube.path[i], tube.path[i + 1]));
+        best2 = std::min(best2, squared_distance_to_segment(p, tube.path[i], tube.path[i + 1]));
     }
-    return best - tube.radius;
+    return std::sqrt(best2) - tube.radius;
 }
 
 double ellipsoid_value(const Ellipsoid& e, Point3 p) {

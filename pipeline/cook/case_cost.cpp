@@ -158,7 +158,7 @@ CaseSize case_size(const Recipe& recipe) {
         spacing_mm = grid.spacing_mm;
         size.column_nodes = nodes_of_column(grid);
         // A torso's organs take the longest; a neck's map has much air.
-        const double for_a_million = in.body.tubes ? 0.147 : in.body.neck_seed != 0 ? 0.053 : 0.4;
+        const double for_a_million = in.body.tubes ? 0.125 : in.body.neck_seed != 0 ? 0.053 : 0.26;
         size.sampling_s = for_a_million * voxels / 1e6;
     } else if (is_mesh_source(path)) {
         if (const auto extent = mesh_inputs_extent(recipe)) {

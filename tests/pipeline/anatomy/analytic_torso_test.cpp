@@ -63,6 +63,26 @@ TEST(AnalyticTorso, SamplingIsTheSameOnOneThreadAndTwo) {
     EXPECT_EQ(sample_analytic_torso(grid).voxels, serial);
 }
 
+// Row by row, by the solids that reach the row, and point by point by all of them.
+TEST(AnalyticTorso, AVoxelHasTheLabelOfItsMiddle) {
+    for (const std::string& name : analytic_body_names()) {
+        const AnalyticBody body = *analytic_body(name);
+        if (body.neck_seed != 0) continue;  // by sections
+        Grid grid = analytic_torso_grid({3.1, 4.3, 5.7}, body);
+        if (body.width_scale != 1) grid.direction = rotation_about(normalized({1, 2, 3}), 0.7);
+        const LabelVolume volume = sample_analytic_torso(grid, body);
+        int others = 0;
+        for (int k = 0; k < volume.grid.size.z; ++k)
+            for (int j = 0; j < volume.grid.size.y; ++j)
+                for (int i = 0; i < volume.grid.size.x; ++i)
+                    others +=
+                        volume.voxels[volume.grid.index(i, j, k)] !=
+                        analytic_torso_label(
+                            volume.grid.point_from_voxel({double(i), double(j), double(k)}), body);
+        EXPECT_EQ(others, 0) << name;
+    }
+}
+
 TEST(AnalyticTorso, TrueWarpsAreStrongAndFarFromFolding) {
     for (const std::string& name : analytic_body_names()) {
         SCOPED_TRACE(name);
