@@ -7,6 +7,7 @@
 
 #include "pressed_block.h"
 #include "support/hard_case.h"
+#include "support/whole_sets.h"
 
 namespace sonocase::runtime {
 namespace {
@@ -32,9 +33,8 @@ TEST(PressedFrame, FastAndSlowRenderersAgreeEffectByEffect) {
         std::vector<std::vector<std::string>> rows{{"auto"}, {"deformation"}};
         for (const char* name : effect_names(model)) rows.push_back({"deformation", name});
         for (const Exercise& exercise : block_exercises())
-            for (const auto& effects : rows) {
-                if (&effects != &rows.front() && exercise.probe.shape != ProbeShape::linear)
-                    continue;
+            for (const auto& effects : half_with_sanitizers(rows)) {
+                if (effects != rows.front() && exercise.probe.shape != ProbeShape::linear) continue;
                 RenderOptions fast = block_picture(model),
                               slow = block_picture(model, 96, RendererKind::reference);
                 fast.effects = slow.effects = effects;
