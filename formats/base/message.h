@@ -47,6 +47,9 @@ class Message : public std::string {
     std::string_view format() const { return format_ ? std::string_view(format_) : *this; }
     const std::vector<Message>& arguments() const { return arguments_; }
 
+    // The text alone.
+    std::string text() const { return substr(0); }
+
     // The same message with blanks for line breaks and other control characters.
     Message on_one_line() const {
         Message line = *this;

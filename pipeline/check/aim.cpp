@@ -368,7 +368,7 @@ std::string aim_exercise(const AimTarget& target,
 
 namespace {
 
-constexpr int kPanelPx = 360;
+constexpr int kPanelPx = 360, kHalfPanelPx = kPanelPx / 2;
 
 }  // namespace
 
@@ -389,13 +389,13 @@ std::vector<std::uint8_t> aim_picture(const CaseLabels& labels,
         for (int y = 0; y < kPanelPx; ++y)
             for (int x = 0; x < kPanelPx; ++x) {
                 const Point3 p =
-                    w.skin + (x - kPanelPx / 2) * mm * w.lateral + (y * mm - 25) * w.beam;
+                    w.skin + (x - kHalfPanelPx) * mm * w.lateral + (y * mm - 25) * w.beam;
                 plot(x, y, labels.bundle().labels[labels.label(p)].colour);
             }
         const auto stroke = [&](Point3 from, Point3 to, std::array<std::uint8_t, 3> colour) {
             for (int s = 0; s <= 800; ++s) {
                 const Vector3 at = from + (s / 800.0) * (to - from) - w.skin;
-                const int x = static_cast<int>(std::lround(dot(at, w.lateral) / mm)) + kPanelPx / 2;
+                const int x = static_cast<int>(std::lround(dot(at, w.lateral) / mm)) + kHalfPanelPx;
                 const int y = static_cast<int>(std::lround((dot(at, w.beam) + 25) / mm));
                 plot(x, y, colour);
                 plot(x + 1, y, colour);

@@ -18,6 +18,8 @@ namespace sonocase::pipeline::inline check {
 
 namespace {
 
+constexpr int kHalfSheetPx = kSheetPx / 2;
+
 constexpr int kCaptionPx = 26, kGapPx = 10, kColumns = 4;
 
 using Colour = std::array<std::uint8_t, 3>;
@@ -42,8 +44,8 @@ struct View {
     double mm_per_px = 1;
 
     Point3 at(int x, int y) const {
-        return middle + (x - kSheetPx / 2) * mm_per_px * across +
-               (y - kSheetPx / 2) * mm_per_px * down;
+        return middle + (x - kHalfSheetPx) * mm_per_px * across +
+               (y - kHalfSheetPx) * mm_per_px * down;
     }
 };
 
@@ -62,8 +64,8 @@ void stroke(const View& view, Point3 from, Point3 to, Colour colour, Panel& pane
         const Vector3 at = from + (s / 800.0) * (to - from) - view.middle;
         const int x = static_cast<int>(std::lround(dot(at, view.across) / view.mm_per_px)),
                   y = static_cast<int>(std::lround(dot(at, view.down) / view.mm_per_px));
-        panel.plot(x + kSheetPx / 2, y + kSheetPx / 2, colour);
-        panel.plot(x + kSheetPx / 2 + 1, y + kSheetPx / 2, colour);
+        panel.plot(x + kHalfSheetPx, y + kHalfSheetPx, colour);
+        panel.plot(x + kHalfSheetPx + 1, y + kHalfSheetPx, colour);
     }
 }
 
@@ -133,8 +135,8 @@ Panel in_space(const CaseBundle& bundle, const char* caption, Vector3 along, Vec
         static_cast<double>(std::max({view.width_px, view.height_px, 1})) / kSheetPx;
     for (int y = 0; y < kSheetPx; ++y)
         for (int x = 0; x < kSheetPx; ++x) {
-            const int from_x = static_cast<int>((x - kSheetPx / 2) * scale + view.width_px / 2.0),
-                      from_y = static_cast<int>((y - kSheetPx / 2) * scale + view.height_px / 2.0);
+            const int from_x = static_cast<int>((x - kHalfSheetPx) * scale + view.width_px / 2.0),
+                      from_y = static_cast<int>((y - kHalfSheetPx) * scale + view.height_px / 2.0);
             if (from_x < 0 || from_y < 0 || from_x >= view.width_px || from_y >= view.height_px)
                 continue;
             const std::uint8_t* pixel =

@@ -287,7 +287,7 @@ Proposal propose(const Template& from, const CaseLabels& labels) {
     Proposal proposal{from.name, "", "", "", {}, 0};
     auto exercise = exercise_of(from);
     if (!exercise) {
-        proposal.why = exercise.error().message();
+        proposal.why = exercise.error().message().text();
         return proposal;
     }
     Target& target = exercise->targets.front();
@@ -347,7 +347,7 @@ std::string why_none_fits(const std::vector<Label>& labels) {
     for (const Template& from : templates()) {
         const auto exercise = exercise_of(from);
         const std::string lacks =
-            !exercise ? exercise.error().message()
+            !exercise ? exercise.error().message().text()
                       : missing(from, *exercise, [&](const std::string& name) {
                             return std::any_of(labels.begin(), labels.end(),
                                                [&](const Label& l) { return l.name == name; });

@@ -293,7 +293,7 @@ Result<std::vector<CasePlan>> plan_cases(const std::vector<std::string>& recipes
             CasePlan bad;
             bad.name = file.filename() == "case.toml" ? file.parent_path().filename().string()
                                                       : file.stem().string();
-            bad.error = plan.error().message();
+            bad.error = plan.error().message().text();
             plan = std::move(bad);
         }
         plan->recipe = path;

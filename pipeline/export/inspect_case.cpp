@@ -502,7 +502,7 @@ void check_exercises(const CaseBundle& bundle, Findings& findings) {
             findings.error("two exercises are named '" + embedded.name + "'");
         const auto exercise = parse_exercise(embedded.toml, embedded.name);
         if (!exercise) {
-            findings.error(exercise.error().message());
+            findings.error(exercise.error().message().text());
             continue;
         }
         for (const Target& target : exercise->targets) {

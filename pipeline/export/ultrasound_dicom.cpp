@@ -186,7 +186,7 @@ namespace {
 constexpr const char* kUltrasoundMultiFrame = "1.2.840.10008.5.1.4.1.1.3.1";
 
 // A text or identifier, padded to an even length as its value representation requires.
-void put(gdcm::DataSet& set, gdcm::Tag tag, gdcm::VR::VRType kind, std::string value) {
+void put(gdcm::DataSet& set, const gdcm::Tag& tag, gdcm::VR::VRType kind, std::string value) {
     if (value.size() % 2 != 0) value += kind == gdcm::VR::UI ? '\0' : ' ';
     gdcm::DataElement element(tag);
     element.SetVR(kind);

@@ -38,10 +38,10 @@ class VoxelGraph {
     }
     std::size_t size() const { return voxel_.size(); }
     Point3 place(std::size_t v) const {
-        const std::size_t at = voxel_[v], x = part_.grid.size.x, y = part_.grid.size.y;
-        return part_.grid.point_from_voxel({static_cast<double>(at % x),
-                                            static_cast<double>(at / x % y),
-                                            static_cast<double>(at / x / y)});
+        const std::size_t at = voxel_[v], x = part_.grid.size.x, y = part_.grid.size.y,
+                          j = at / x % y, k = at / x / y;
+        return part_.grid.point_from_voxel(
+            {static_cast<double>(at % x), static_cast<double>(j), static_cast<double>(k)});
     }
     // visit(neighbour, length): -1 for one outside the vessel, -2 for one beyond the map.
     template <class Visit>

@@ -18,10 +18,9 @@ constexpr int kMarginVx = 4;
 
 Vector3 voxel_of(const VoxelBox& box, std::uint32_t index) {
     const auto x = static_cast<std::uint32_t>(box.size.x),
-               y = static_cast<std::uint32_t>(box.size.y);
-    return {static_cast<double>(box.first.x) + index % x,
-            static_cast<double>(box.first.y) + index / x % y,
-            static_cast<double>(box.first.z) + index / x / y};
+               y = static_cast<std::uint32_t>(box.size.y), j = index / x % y, k = index / x / y;
+    return {static_cast<double>(box.first.x) + index % x, static_cast<double>(box.first.y) + j,
+            static_cast<double>(box.first.z) + k};
 }
 
 // Distances to the surface half a voxel before the nearest voxel of these labels, mm, in a box

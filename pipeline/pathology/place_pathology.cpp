@@ -293,10 +293,10 @@ Result<Lesion> Placer::tube(const Context& c) {
             static_cast<double>(inside.size()));
         const VoxelBox& box = clear.box();
         const std::uint32_t at = inside[n], x = static_cast<std::uint32_t>(box.size.x),
-                            y = static_cast<std::uint32_t>(box.size.y);
-        middle = {static_cast<double>(box.first.x) + at % x,
-                  static_cast<double>(box.first.y) + at / x % y,
-                  static_cast<double>(box.first.z) + at / x / y};
+                            y = static_cast<std::uint32_t>(box.size.y), j = at / x % y,
+                            k = at / x / y;
+        middle = {static_cast<double>(box.first.x) + at % x, static_cast<double>(box.first.y) + j,
+                  static_cast<double>(box.first.z) + k};
     }
     const VoxelField limit = ball(middle, 0.5 * r.length_mm / c.voxel_mm);
     std::size_t lumen = 0;

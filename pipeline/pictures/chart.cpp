@@ -354,8 +354,9 @@ Canvas drawn(const ChartSheet& sheet) {
     const int down = std::max(1, (count + across - 1) / across);
     Canvas canvas(across * sheet.width_px, down * sheet.height_px);
     for (int i = 0; i < count; ++i) {
+        const int row = i / across;
         const Area cell{1.0 * (i % across) * sheet.width_px,
-                        1.0 * (down - 1 - i / across) * sheet.height_px, 1.0 * sheet.width_px,
+                        1.0 * (down - 1 - row) * sheet.height_px, 1.0 * sheet.width_px,
                         1.0 * sheet.height_px};
         draw_chart(sheet.charts[i], cell, canvas);
     }

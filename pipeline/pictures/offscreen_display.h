@@ -14,6 +14,7 @@
 
 #include "formats/base/result.h"
 
+// NOLINTNEXTLINE(cppcoreguidelines-virtual-class-destructor): VTK's, which deletes itself.
 class vtkRenderWindow;
 
 namespace sonocase::pipeline::inline pictures {

@@ -393,8 +393,8 @@ void check_hands(const FitContext& s,
         if (best_fit_mm(in_mirror) < kMirrorScore * here) break;
     }
     if (best_fit_mm(in_mirror) >= kMirrorScore * here) {
-        for (JudgedPose& p : judge_candidates(s, target, there, field, rigid, progress))
-            in_mirror.push_back(std::move(p));
+        for (const JudgedPose& p : judge_candidates(s, target, there, field, rigid, progress))
+            in_mirror.push_back(p);
     }
     const double score = choice->mirror_score_mm = best_fit_mm(in_mirror);
     const std::string scores =

@@ -785,7 +785,7 @@ std::array<float, 4> LabelField::weigh_difference(const Position& position,
                                                   std::size_t b) const {
     const float unit = std::is_same_v<Number, float> ? 1 : step_mm_;
     const CandidateSet& set = *position.candidates;
-    const auto& [wx, wy, wz] = position.weights;
+    const auto &wx = position.weights[0], &wy = position.weights[1], &wz = position.weights[2];
     const Four sx = slopes(position.t[0]), sy = slopes(position.t[1]), sz = slopes(position.t[2]);
     const Four w = load(wx.data());
     const Four per_mm{per_mm_[0], per_mm_[1], per_mm_[2], 0};

@@ -116,10 +116,10 @@ class OptionsOf {
     template <class Slot>
     OptionsOf& choice(const char* key,
                       Slot slot,
-                      std::vector<std::string> choices,
+                      const std::vector<std::string>& choices,
                       const char* unit,
                       const char* meaning) {
-        add(key, slot, unit, meaning).choices = std::move(choices);
+        add(key, slot, unit, meaning).choices = choices;
         return *this;
     }
     template <class Slot>

@@ -91,7 +91,8 @@ Suite own_case_suite(const Recipe& recipe) {
         if (state->finest.voxels.empty()) {
             SONOCASE_TRY(auto made, cook(settings_of(*built_in_stages().find_preset("accurate"))));
             state->finest = labels_of(made.bundle);
-            state->finest_boundary = made.bundle.boundary;
+            state->finest_boundary =
+                static_cast<const BrickVolume<std::uint32_t>&>(made.bundle.boundary);
         }
         const double before = processor_seconds();
         SONOCASE_TRY(const auto made, cook(settings));

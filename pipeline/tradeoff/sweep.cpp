@@ -251,7 +251,7 @@ Trial measure_trial(const Suite& suite, Trial trial, int repeats) {
         if (!result) {
             trial.error = NAN;
             trial.seconds = trial.seconds_low = trial.seconds_high = NAN;
-            trial.note = result.error().message();
+            trial.note = result.error().message().text();
             return trial;
         }
         trial.error = result->error;  // the same each time: stages are deterministic

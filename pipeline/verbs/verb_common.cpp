@@ -117,7 +117,7 @@ std::optional<int> parse_command_line(CLI::App& app, int argc, char** argv) {
 }
 
 int fail(const char* verb, const Error& error) {
-    std::fprintf(stderr, "sonocase %s: %s\n", verb, one_line(error.message()).c_str());
+    std::fprintf(stderr, "sonocase %s: %s\n", verb, one_line(error.message().text()).c_str());
     return kFailed;
 }
 

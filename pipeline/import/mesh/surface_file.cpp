@@ -100,7 +100,8 @@ std::size_t usual_near(const std::unordered_map<std::uint64_t, std::size_t>& usu
     constexpr double kEdgeMm = kBlock * kThinningMm;
     std::size_t largest = 0;
     for (int n = 0; n < 27; ++n) {
-        const Vector3 aside{double(n % 3 - 1), double(n / 3 % 3 - 1), double(n / 9 - 1)};
+        const int x = n % 3 - 1, y = n / 3 % 3 - 1, z = n / 9 - 1;
+        const Vector3 aside{double(x), double(y), double(z)};
         const auto found = usual.find(key_of(p + kEdgeMm * aside, kEdgeMm));
         if (found != usual.end()) largest = std::max(largest, found->second);
     }

@@ -417,7 +417,7 @@ bool unpack_dicom_runs(std::string_view from, std::size_t pixels, std::size_t by
         std::size_t at = number(plane + 1), done = 0;
         while (done < pixels) {
             if (at >= from.size()) return false;
-            const int code = static_cast<signed char>(from[at++]);
+            const int code = static_cast<std::int8_t>(from[at++]);
             if (code == -128) continue;
             const auto count = static_cast<std::size_t>(code < 0 ? 1 - code : 1 + code);
             const std::size_t stored = code < 0 ? 1 : count;

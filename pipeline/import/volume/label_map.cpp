@@ -184,7 +184,7 @@ Result<NameSources> name_sources(const LabelLayers& file,
                 sources.tables.push_back(*std::move(table));
             else
                 warnings.push_back("the file beside the map names no values and is left out (" +
-                                   std::string(fine.error().message()) +
+                                   fine.error().message().text() +
                                    "): give --table if there is one");
         }
     }
@@ -245,8 +245,9 @@ BodySummary summary_of(const StructureList& list, double scale) {
         for (const VoxelRun run : s.runs) {
             // A run may go on into the rows that follow: its middle is near enough.
             const std::uint64_t middle = run.first + run.count / 2;
-            const Vector3 at{static_cast<double>(middle % x), static_cast<double>(middle / x % y),
-                             static_cast<double>(middle / (x * y))};
+            const std::uint64_t j = middle / x % y, k = middle / (x * y);
+            const Vector3 at{static_cast<double>(middle % x), static_cast<double>(j),
+                             static_cast<double>(k)};
             sum = sum + run.count * at;
             squares = squares + run.count * Vector3{at.x * at.x, at.y * at.y, at.z * at.z};
             const double half = std::min(0.5 * (run.count - 1.0), 0.5 * (grid.size.x - 1.0));

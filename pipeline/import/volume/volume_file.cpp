@@ -151,6 +151,7 @@ bool whole_number(T stored, const Scale& scale, std::int32_t* whole) {
         return true;
     }
     if constexpr (std::is_integral_v<T>) {
+        // NOLINTNEXTLINE(bugprone-signed-char-misuse): a voxel of eight bits may have a sign.
         *whole = static_cast<std::int32_t>(stored);
         return static_cast<T>(*whole) == stored && (*whole < 0) == (stored < T{0});
     }

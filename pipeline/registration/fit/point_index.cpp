@@ -27,6 +27,7 @@ struct SquaredDistance {
     using ElementType = double;
     using DistanceType = double;
     const Cloud& cloud;
+    explicit SquaredDistance(const Cloud& points) : cloud(points) {}
     double evalMetric(const double* a, std::uint32_t b, std::size_t) const {
         const Point3 p = cloud.points[b];
         const double x = a[0] - p.x, y = a[1] - p.y, z = a[2] - p.z;

@@ -91,9 +91,10 @@ class Outline {
 };
 
 Vector3 direction_of(std::size_t n) {
-    const std::size_t face = n / (kCells * kCells), cell = n % (kCells * kCells);
-    const double a = 2 * (static_cast<double>(cell % kCells) + 0.5) / kCells - 1;
-    const double b = 2 * (static_cast<double>(cell / kCells) + 0.5) / kCells - 1;
+    const std::size_t face = n / (kCells * kCells), cell = n % (kCells * kCells),
+                      column = cell % kCells, row = cell / kCells;
+    const double a = 2 * (static_cast<double>(column) + 0.5) / kCells - 1;
+    const double b = 2 * (static_cast<double>(row) + 0.5) / kCells - 1;
     Vector3 d;
     d[static_cast<int>(face / 2)] = face % 2 == 0 ? 1 : -1;
     d[static_cast<int>((face / 2 + 1) % 3)] = a;
