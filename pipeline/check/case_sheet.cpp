@@ -19,7 +19,6 @@ namespace sonocase::pipeline::inline check {
 namespace {
 
 constexpr int kHalfSheetPx = kSheetPx / 2;
-
 constexpr int kCaptionPx = 26, kGapPx = 10, kColumns = 4;
 
 using Colour = std::array<std::uint8_t, 3>;
