@@ -125,7 +125,7 @@ class ManyAttempts : public PressingExercises {
     // Turns the probe until the vein closes under a force below the exercise's limit, and does so
     // some times; a vein that closes nowhere is left.
     static bool compress_times(
-        int times, Attempt& attempt, PressingHand& hand, double gentle_n = 27, int tries = 24) {
+        int times, Attempt& attempt, PressingHand& hand, double gentle_n = 13, int tries = 24) {
         // Over the groin, as the exercise shows it: from elsewhere bone lies in the way.
         const SweepKey& groin = hand.exercise().sweeps.front().keys.front();
         if (attempt.exercise.targets.size() == 1) attempt.mouse.put_probe(groin.probe, groin.beam);
@@ -172,7 +172,7 @@ TEST_F(ManyAttempts, BothGroinsArePressed) {
         const SweepKey& left = hand.sweep("left").keys.front();
         if (!attempt.mouse.put_probe(left.probe, left.beam)) return false;
         // It does not close: no harder than the other one took, and not everywhere.
-        return compress_times(1, attempt, hand, 22, 4);
+        return compress_times(1, attempt, hand, 11, 4);
     };
     const Outcome out = play_many("compression-both-sides", both_sides);
     EXPECT_GE(out.passed, kSkilled * out.attempts);
@@ -202,7 +202,7 @@ TEST_F(ManyAttempts, AHandThatLeavesSomethingOutPassesNone) {
     const auto too_light = [](Attempt& attempt, PressingHand& hand) {
         const auto ways = sonocase::testing::look_as_an_expert(attempt);
         for (int n = 0; !ways.empty() && n < 3; ++n)
-            hand.compress(ways.front().mannequin_from_probe(), 3);
+            hand.compress(ways.front().mannequin_from_probe(), 2);
         return !ways.empty();
     };
     const auto one_side = [](Attempt& attempt, PressingHand& hand) {
@@ -228,9 +228,9 @@ TEST_F(PressingExercises, TheirSweepsStandWhereTheVeinCloses) {
                 hand.compress(hand.probe_of(hand.sweep("stand")), most_n);
         };
     };
-    EXPECT_TRUE(play("compression-test", compress(3, 60)).passed);
-    EXPECT_FALSE(play("compression-test", compress(1, 60)).passed);
-    EXPECT_FALSE(play("compression-test", compress(3, 4)).passed);  // too light
+    EXPECT_TRUE(play("compression-test", compress(3, 30)).passed);
+    EXPECT_FALSE(play("compression-test", compress(1, 30)).passed);
+    EXPECT_FALSE(play("compression-test", compress(3, 2)).passed);  // too light
     const auto needle = [](double press_mm) {
         return [=](PressingHand& hand) { hand.play(hand.sweep("needle"), press_mm); };
     };

@@ -17,6 +17,8 @@
 
 #include <cmath>
 
+#include "runtime/imaging/press/press_face.h"
+
 namespace sonocase::runtime::press {
 
 inline constexpr double kWidthPerHalfHeight = 1.35, kWidthPerDepth = 0.30;
@@ -30,10 +32,15 @@ inline constexpr double kLumenGain = 2, kLumenGrowth = 1;
 // A lumen's stretch of 0.3 and less falls linearly to 0.02 at 0.2: its walls touch.
 inline constexpr double kClosing = 0.3, kClosed = 0.2, kMinLumen = 0.02;
 
-// Force on the face: the stress below the skin and a part of what the skin spreads to its sides,
-// q = (1 - 0.12) q_2 + 0.12 q_0 with q_k the stress of row k over the width of the field there.
-inline constexpr double kSkinShare = 0.12;
-inline constexpr int kBelowSkinRow = 2;
+// Force on the face: what the tissue of all columns carries at a depth t, and what the tissue above
+// has handed on to its sides by then,
+//
+//     F = sqrt(pi) h sum_i (1 + 0.08 t/mm) s q_i,
+//
+// q the stress of a row; the mean over the rows with 8 mm < t < 13 mm above the column's bone, or
+// the last row above a bone that is nearer. Stress in the skin counts for nothing here: its
+// stiffness hands it from column to column, many times the force of the face.
+inline constexpr double kHandedOnPerMm = 0.08, kForceFromMm = 8, kForceToMm = 13;
 
 // Tissue that is squeezed along the beam goes sideways within this length, and the rest goes across
 // the plane.
@@ -45,6 +52,27 @@ inline constexpr double kSearchMm = 40;   // and this far in front of it
 
 inline double field_width_mm(double half_height_mm, double depth_mm) {
     return kWidthPerHalfHeight * half_height_mm + kWidthPerDepth * depth_mm;
+}
+
+inline double force_share(double half_height_mm, double depth_mm) {
+    return (1 + kHandedOnPerMm * depth_mm) * field_width_mm(half_height_mm, depth_mm);
+}
+
+// A column's part of the force over sqrt(pi) and its width. fixed_row: the first row that is bone.
+template <class StressOfRow>
+double force_per_width(const PressFace& face, int fixed_row, StressOfRow stress_of) {
+    double sum = 0;
+    int rows = 0;
+    const auto add = [&](int k) {
+        const double t = row_middle(k), spread = face.radius_mm > 0 ? 1 + t / face.radius_mm : 1;
+        sum += force_share(face.half_height_mm, t) * spread * stress_of(k);
+        ++rows;
+    };
+    for (int k = 0; k < fixed_row; ++k) {
+        if (row_middle(k) > kForceFromMm && row_middle(k) < kForceToMm) add(k);
+    }
+    if (rows == 0 && fixed_row > 0) add(fixed_row - 1);
+    return rows > 0 ? sum / rows : 0;
 }
 
 // Across the plane the shift along the beam fades with exp(-y^2 / 2 w^2), and the sideways shift

@@ -308,18 +308,13 @@ void stretch_columns(SimdTarget simd,
                      const PressElastic& elastic,
                      PressColumns& out) {
     HWY_DISPATCH_TABLE(stretch)[simd.index](samples, elastic, out);
-    double newtons = 0;
-    for (int i = 0; i < kColumns; ++i) {
-        if (!samples.touching[i]) continue;
-        const auto over_width = [&](int k) {
-            return field_width_mm(face.half_height_mm, row_middle(k)) *
-                   static_cast<double>(elastic.stress_kpa.row(k)[i]);
-        };
-        newtons += static_cast<double>(out.factor[i]) *
-                   ((1 - kSkinShare) * over_width(kBelowSkinRow) + kSkinShare * over_width(0));
-    }
+    double millinewtons = 0;
+    for (int i = 0; i < kColumns; ++i)
+        millinewtons += force_per_width(face, samples.fixed_row[i], [&](int k) {
+            return static_cast<double>(elastic.stress_kpa.row(k)[i]);
+        });
     const double root_pi = 1.7724538509055159;
-    out.force_n = std::max(0.0, 1e-3 * root_pi * column_width_mm(face) * newtons);
+    out.force_n = std::max(0.0, 1e-3 * root_pi * column_width_mm(face) * millinewtons);
 }
 
 void build_table(SimdTarget simd,

@@ -219,6 +219,10 @@ Result<FemBlock> read_fem_block(const std::string& folder) {
     block.materials = std::move(materials->bytes);
     for (const Json& entry : json["states"]) {
         FemState state{entry["pressed_mm"], entry.value("force_n", 0.0), {}};
+        if (!entry.contains("file")) {
+            block.states.push_back(std::move(state));
+            continue;
+        }
         const std::string path = folder + "/" + entry["file"].get<std::string>();
         const auto shifts = read_nrrd(path, 4);
         if (!shifts) return shifts.error();
@@ -243,6 +247,7 @@ BlockError compare(const FemBlock& block,
     out.pressed_mm = state.pressed_mm;
     out.fem_force_n = state.force_n;
     out.force_n = field.state().force_n;
+    if (state.shift_mm.empty()) return out;
     const auto errors_at = [&](int j, double& moved) {
         std::vector<double> errors;
         for (int k = 0; k < block.nodes.z; ++k)

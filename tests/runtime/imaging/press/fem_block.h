@@ -18,7 +18,7 @@ namespace sonocase::testing {
 struct FemState {
     double pressed_mm = 0;
     double force_n = 0;
-    std::vector<float> shift_mm;  // x, y, z of every node
+    std::vector<float> shift_mm;  // x, y, z of every node; empty: the force alone is known
 };
 
 struct FemBlock {
@@ -39,7 +39,7 @@ struct FemBlock {
 
 // Reads block.json and the volumes it names. The face is `half_face_mm` of block.json [along x,
 // along y] where that is given; else the smaller one of 40 x 8 and 50 x 12 mm that holds every node
-// that the states press.
+// that the states press. A state without a file has its force alone.
 Result<FemBlock> read_fem_block(const std::string& folder);
 
 struct BlockError {

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <vector>
 
 #include "runtime/imaging/press/press_law.h"
 
@@ -126,7 +128,7 @@ void PlainPress::solve_increment(double share) {
 }
 
 void PlainPress::stretch() {
-    double newtons = 0;
+    double newtons = 0;  // thousandths, over the width of a column and sqrt(pi)
     for (int i = 0; i < kColumns; ++i) {
         const auto length_of = [&](double factor, bool keep) {
             double length = 0;
@@ -152,14 +154,23 @@ void PlainPress::stretch() {
             }
             const double scale = wanted / length_of(factor, true);
             for (int j = 0; j < s_.bone_part[at(i)]; ++j) stretch_[at(i)][at(j)] *= scale;
-            const auto over_width = [&](int k) {
-                return field_width_mm(face_.half_height_mm, row_middle(k)) * stress_[at(i)][at(k)];
-            };
-            newtons += factor *
-                       ((1 - kSkinShare) * over_width(kBelowSkinRow) + kSkinShare * over_width(0));
         } else {
             (void)length_of(1, true);
         }
+        const double a = face_.half_height_mm;
+        std::vector<double> carried;  // by each row that counts, and what has spread above it
+        const auto carry = [&](int k) {
+            const double t = row_middle(k), fan = face_.radius_mm > 0 ? 1 + t / face_.radius_mm : 1;
+            carried.push_back((1 + kHandedOnPerMm * t) * field_width_mm(a, t) * fan *
+                              stress_[at(i)][at(k)]);
+        };
+        const int moving = s_.fixed_row[at(i)];
+        for (int k = 0; k < moving; ++k)
+            if (row_middle(k) > kForceFromMm && row_middle(k) < kForceToMm) carry(k);
+        if (carried.empty() && moving > 0) carry(moving - 1);
+        if (!carried.empty())
+            newtons += std::accumulate(carried.begin(), carried.end(), 0.0) /
+                       static_cast<double>(carried.size());
         edge_[at(i)][kFineRows] = kFineEdge[kFineRows] - s_.pressed_mm[at(i)];
         for (int j = kFineRows - 1; j >= 0; --j)
             edge_[at(i)][at(j)] = edge_[at(i)][at(j + 1)] - stretch_[at(i)][at(j)] * fine_height(j);

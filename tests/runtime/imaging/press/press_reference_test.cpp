@@ -40,7 +40,7 @@ TEST(PressReference, TheFastFieldIsThePlainOneUpToItsIterations) {
     PressField field({});
     HardCase iterated("fast field off the plain one, all iterations", HardCase::at_most, 0.06,
                       "mm");
-    HardCase force("its force, off", HardCase::at_most, 0.03, "");
+    HardCase force("its force, off", HardCase::at_most, 0.001, "");
     HardCase frame("with the iterations of a frame, over what is pressed", HardCase::at_most, 0.02,
                    "");
     for (const double pressed_mm : {2.0, 8.0, 15.0}) {
