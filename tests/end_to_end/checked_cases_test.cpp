@@ -21,6 +21,7 @@
 #include "support/cooked_case.h"
 #include "support/hard_case.h"
 #include "support/paths.h"
+#include "support/whole_sets.h"
 
 namespace sonocase::pipeline {
 namespace {
@@ -209,14 +210,18 @@ TEST(CheckedCases, HaveNoFaultsAndTenPlantedOnesAreNamed) {
     testing::HardCase planted_ones("of ten planted faults in each case, named",
                                    testing::HardCase::at_least, 10, "");
     testing::HardCase none("faults of the cases as they are", testing::HardCase::at_most, 0, "");
+    int turn = 0;
     for (const Body& body : kBodies) {
         const CaseBundle* bundle = cooked(body);
         if (bundle == nullptr) continue;
         const CheckResult plain = check_case(*bundle);
         EXPECT_TRUE(plain.faults.empty()) << body.scenario << "\n" << all_of(plain);
         none.see(static_cast<double>(plain.faults.size()));
-        int found = 0;
+        // A change plants every other one, in each body those that the one before left out.
+        int found = 0, tried = 0;
         for (const Planted& planted : ten_faults()) {
+            if (!testing::whole_sets() && (turn++ % 2 != 0)) continue;
+            ++tried;
             CaseBundle spoilt = *bundle;
             spoilt.exercises = {aimed_exercise(*bundle)};
             planted.plant(spoilt);
@@ -228,9 +233,10 @@ TEST(CheckedCases, HaveNoFaultsAndTenPlantedOnesAreNamed) {
                                   << all_of(result);
             found += named_it;
         }
-        planted_ones.see(found);
-        std::printf("%s: %zu faults, %d of 10 planted ones named\n", body.scenario,
-                    plain.faults.size(), found);
+        ++turn;
+        planted_ones.see(10.0 * found / tried);
+        std::printf("%s: %zu faults, %d of %d planted ones named\n", body.scenario,
+                    plain.faults.size(), found, tried);
     }
 }
 
@@ -249,7 +255,8 @@ TEST(CheckedCases, WhatTheSkinDoesNotTellIsSaidByBuildAndByCheck) {
               1);
 }
 
-// Liver, spleen and kidney, 20 seeds: half a voxel of 8 mm3 is .2 % of 2 ml.
+// Liver, spleen and kidney, 20 seeds, of which a change tries 10: half a voxel of 8 mm3 is .2 % of
+// 2 ml.
 TEST(CheckedCases, LesionsHaveTheVolumeAskedForInEveryBody) {
     testing::HardCase off("volume of a lesion of 2 ml, off", testing::HardCase::at_most, 0.0021,
                           "");
@@ -258,7 +265,7 @@ TEST(CheckedCases, LesionsHaveTheVolumeAskedForInEveryBody) {
         if (bundle == nullptr) continue;
         const LabelVolume volume{bundle->grid, dense_from_bricks(bundle->label_bricks),
                                  bundle->labels};
-        for (int seed = 1; seed <= 20; ++seed) {
+        for (int seed = 1; seed <= 20; seed += testing::whole_sets() ? 1 : 2) {
             std::vector<PathologyRequest> requests;
             for (const char* host : {"liver", "spleen", "kidney_left"}) {
                 PathologyRequest request;

@@ -12,6 +12,7 @@
 #include "support/cooked_case.h"
 #include "support/paths.h"
 #include "support/run_command.h"
+#include "support/whole_sets.h"
 
 namespace sonocase {
 namespace {
@@ -98,8 +99,11 @@ void expect_scripts_pass(const Case& of) {
     }
 }
 
-// bluffs: spread over the exercises. expert_attempts: at each of them.
-void expect_honest(const Case& of, int bluffs, int expert_attempts) {
+// A thousand bluffs, spread over the exercises, and twenty attempts of an expert at each; a change
+// tries half of them.
+void expect_honest(const Case& of) {
+    const int bluffs = testing::whole_sets() ? 1000 : 500;
+    const int expert_attempts = testing::whole_sets() ? 20 : 10;
     expect_scripts_pass(of);
     const int each = bluffs / static_cast<int>(of.exercises.size());
     Passed all_bluffs, all_experts;
@@ -126,7 +130,7 @@ std::string cooked_in_silence(const std::string& arguments) {
 }
 
 TEST(HonestExercises, OfTheDemoTorso) {
-    expect_honest(Case(cooked_in_silence("--preset draft")), 1000, 20);
+    expect_honest(Case(cooked_in_silence("--preset draft")));
 }
 
 TEST(HonestExercises, OfTheRealTorso) {
@@ -134,7 +138,7 @@ TEST(HonestExercises, OfTheRealTorso) {
     if (!fs::exists(data + "/ct/labels.nii.gz")) GTEST_SKIP() << "no " << data;
     const auto& cooked =
         testing::cooked_scenario("real-torso/case.toml", "--set resample.voxel_mm=2");
-    expect_honest(Case(cooked.path), 1000, 20);
+    expect_honest(Case(cooked.path));
 }
 
 // Exercises of the other scenarios whose script has a needle from the start; those that press or
