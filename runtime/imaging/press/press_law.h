@@ -17,8 +17,6 @@
 
 #include <cmath>
 
-#include "runtime/imaging/press/press_face.h"
-
 namespace sonocase::runtime::press {
 
 inline constexpr double kWidthPerHalfHeight = 1.35, kWidthPerDepth = 0.30;
@@ -52,27 +50,6 @@ inline constexpr double kSearchMm = 40;   // and this far in front of it
 
 inline double field_width_mm(double half_height_mm, double depth_mm) {
     return kWidthPerHalfHeight * half_height_mm + kWidthPerDepth * depth_mm;
-}
-
-inline double force_share(double half_height_mm, double depth_mm) {
-    return (1 + kHandedOnPerMm * depth_mm) * field_width_mm(half_height_mm, depth_mm);
-}
-
-// A column's part of the force over sqrt(pi) and its width. fixed_row: the first row that is bone.
-template <class StressOfRow>
-double force_per_width(const PressFace& face, int fixed_row, StressOfRow stress_of) {
-    double sum = 0;
-    int rows = 0;
-    const auto add = [&](int k) {
-        const double t = row_middle(k), spread = face.radius_mm > 0 ? 1 + t / face.radius_mm : 1;
-        sum += force_share(face.half_height_mm, t) * spread * stress_of(k);
-        ++rows;
-    };
-    for (int k = 0; k < fixed_row; ++k) {
-        if (row_middle(k) > kForceFromMm && row_middle(k) < kForceToMm) add(k);
-    }
-    if (rows == 0 && fixed_row > 0) add(fixed_row - 1);
-    return rows > 0 ? sum / rows : 0;
 }
 
 // Across the plane the shift along the beam fades with exp(-y^2 / 2 w^2), and the sideways shift

@@ -300,6 +300,23 @@ float min_spread(const PressFace& face, const Plane<kBulgeRows>& bulge) {
     return 1 - steepest / static_cast<float>(column_width_mm(face));
 }
 
+// A column's part of the force, over its width and sqrt(pi), by press_law.h.
+double column_force(const PressFace& face, const Plane<kRows>& stress_kpa, int i, int fixed_row) {
+    double sum = 0;
+    int rows = 0;
+    const auto add = [&](int k) {
+        const double t = row_middle(k), fan = face.radius_mm > 0 ? 1 + t / face.radius_mm : 1;
+        sum += (1 + kHandedOnPerMm * t) * field_width_mm(face.half_height_mm, t) * fan *
+               static_cast<double>(stress_kpa.row(k)[i]);
+        ++rows;
+    };
+    for (int k = 0; k < fixed_row; ++k) {
+        if (row_middle(k) > kForceFromMm && row_middle(k) < kForceToMm) add(k);
+    }
+    if (rows == 0 && fixed_row > 0) add(fixed_row - 1);
+    return rows > 0 ? sum / rows : 0;
+}
+
 }  // namespace
 
 void stretch_columns(SimdTarget simd,
@@ -310,9 +327,7 @@ void stretch_columns(SimdTarget simd,
     HWY_DISPATCH_TABLE(stretch)[simd.index](samples, elastic, out);
     double millinewtons = 0;
     for (int i = 0; i < kColumns; ++i)
-        millinewtons += force_per_width(face, samples.fixed_row[i], [&](int k) {
-            return static_cast<double>(elastic.stress_kpa.row(k)[i]);
-        });
+        millinewtons += column_force(face, elastic.stress_kpa, i, samples.fixed_row[i]);
     const double root_pi = 1.7724538509055159;
     out.force_n = std::max(0.0, 1e-3 * root_pi * column_width_mm(face) * millinewtons);
 }

@@ -25,7 +25,7 @@ struct PressColumns {
 // closes.
 //
 // Every stretch is positive, so depth rises along each column: it can be inverted. Force in
-// newtons: F = sqrt(pi) h sum_i q_i over the columns that touch, q as in press_law.h. Cost: 15 us.
+// newtons as press_law.h says, over all columns. Cost: 15 us.
 void stretch_columns(SimdTarget simd,
                      const PressSamples& samples,
                      const PressFace& face,
