@@ -55,8 +55,8 @@ INSTANTIATE_TEST_SUITE_P(All, PressBlocks, ::testing::Values("vessel", "vesselbo
 
 // Blocks made by scripts/press-blocks: skin that slopes in steps, a limb, a vein right below the
 // skin, the abdomen under a face as wide as a curved probe's, a rib under half of the face. Their
-// elements of 2.5 mm are 8 % stiffer than those of 1.25 mm above (homogeneous tissue at 4 mm), so
-// the bounds of 0.8 and 1.3 are 0.74 and 1.2 here.
+// elements of 2.5 mm are stiffer than those of 1.25 mm above, those of 2 mm by 8 % (homogeneous
+// tissue at 4 mm), so the bounds of 0.8 and 1.3 are 0.74 and 1.2 here.
 class PressForces : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(PressForces, LieNearTheFiniteElementsWhateverTheShape) {
