@@ -13,6 +13,7 @@
 
 #include "formats/base/digest.h"
 #include "formats/files/atomic_file.h"
+#include "support/cooked_case.h"
 #include "support/paths.h"
 #include "support/run_command.h"
 #include "support/temporary_folder.h"
@@ -22,6 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+using sonocase::testing::cooked_scenario;
 using sonocase::testing::read_text;
 using sonocase::testing::run_command;
 
@@ -70,8 +72,11 @@ class SameBytes : public ::testing::Test {
         return digest.hex();
     }
 
-    void expect_frames(const std::string& bundle, const char* physical, const char* paper) {
-        for (const int threads : {1, 2}) {
+    void expect_frames(const std::string& bundle,
+                       const char* physical,
+                       const char* paper,
+                       const std::vector<int>& numbers_of_threads) {
+        for (const int threads : numbers_of_threads) {
             EXPECT_EQ(frames_digest(bundle, "physical", threads), physical) << threads;
             EXPECT_EQ(frames_digest(bundle, "paper", threads), paper) << threads;
         }
@@ -85,12 +90,12 @@ TEST_F(SameBytes, DemoTorsoDraftAndItsFrames) {
     EXPECT_EQ(*digest_of_file(cook(recipe, 1)), kDraft);
     const std::string bundle = cook(recipe, 2);
     EXPECT_EQ(*digest_of_file(bundle), kDraft);
-    expect_frames(bundle, kDraftPhysical, kDraftPaper);
+    expect_frames(bundle, kDraftPhysical, kDraftPaper, {1, 2});
 }
 
+// The two that other tests cook as well, of stages that this run of tests cooked.
 TEST_F(SameBytes, DemoTorsoBalanced) {
-    const std::string recipe = SONOCASE_SOURCE "/scenarios/demo-torso/case.toml";
-    EXPECT_EQ(*digest_of_file(cook(recipe, 2)), kBalanced);
+    EXPECT_EQ(*digest_of_file(cooked_scenario("demo-torso/case.toml").path), kBalanced);
 }
 
 TEST_F(SameBytes, SlenderTorso) {
@@ -107,10 +112,9 @@ TEST_F(SameBytes, SlenderTorso) {
 
 TEST_F(SameBytes, RealTorsoAndItsFrames) {
     if (!fs::exists(SONOCASE_DATA "/ct/labels.nii.gz")) GTEST_SKIP() << "no " SONOCASE_DATA;
-    const std::string bundle =
-        cook(SONOCASE_SOURCE "/scenarios/real-torso/case.toml --data " SONOCASE_DATA, 2);
+    const std::string bundle = cooked_scenario("real-torso/case.toml").path;
     EXPECT_EQ(*digest_of_file(bundle), kReal);
-    expect_frames(bundle, kRealPhysical, kRealPaper);
+    expect_frames(bundle, kRealPhysical, kRealPaper, {2});
 }
 
 }  // namespace
