@@ -38,10 +38,10 @@ OptionGroup options() {
             "vessels shorter than this are left out")
         .number(
             "unknown_ml_min", [](auto& o) { return &o.unknown_ml_min; }, 0, 10000, "mL/min",
-            "flow through vessels whose names say nothing; 0: by their size")
+            "flow through vessels of unknown name; 0: by their size")
         .choice(
             "unknown_wave", [](auto& o) { return &o.unknown_wave; }, {"steady", "artery", "vein"},
-            "", "how that flow pulses");
+            "", "how the flow through vessels of unknown name pulses");
 }
 
 Result<StageValue> run(StageInputs& inputs, const Progress& progress) {

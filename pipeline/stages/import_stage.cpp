@@ -63,7 +63,8 @@ void add_meshes(OptionsOf<MeshImportOptions>& options) {
             "meshes: largest section of a lumen")
         .number(
             "accuracy", [](auto& o) { return &o.mesh.accuracy; }, 1, 10, "radii",
-            "meshes: how far a box of triangles is taken for a point of an open surface");
+            "meshes: distance from which a box of triangles counts as one point of an open "
+            "surface");
 }
 
 void add_body(OptionsOf<MeshImportOptions>& options) {
@@ -73,7 +74,7 @@ void add_body(OptionsOf<MeshImportOptions>& options) {
         .flag("body")
         .number(
             "arms_off_mm", [](auto& o) { return &o.body.arms_off_mm; }, 0, 1000, "mm",
-            "parts of slices farther from the midline go; 0: none")
+            "parts of slices farther from the midline are removed; 0: none")
         .number(
             "skin_mm", [](auto& o) { return &o.body.skin_mm; }, 0.5, 10, "mm", "thickness")
         .number(
@@ -86,12 +87,12 @@ void add_body(OptionsOf<MeshImportOptions>& options) {
             "wall of the belly")
         .number(
             "back_muscle_mm", [](auto& o) { return &o.body.back_muscle_mm; }, 5, 80, "mm",
-            "muscle about spine, pelvis and thigh")
+            "muscle round spine, pelvis and thigh")
         .toggle(
             "spine", [](auto& o) { return &o.body.spine; }, "vertebrae, discs, canal")
         .number(
             "disc_pitch_mm", [](auto& o) { return &o.body.disc_pitch_mm; }, 15, 60, "mm",
-            "from disc to disc in the loin")
+            "distance from disc to disc in the lumbar spine")
         .toggle(
             "ribs", [](auto& o) { return &o.body.ribs; }, "ribs, cartilage, sternum")
         .number(
@@ -123,7 +124,7 @@ void add_body(OptionsOf<MeshImportOptions>& options) {
             "gall_bladder", [](auto& o) { return &o.body.gall_bladder; }, "gall bladder")
         .number(
             "bladder_ml", [](auto& o) { return &o.body.bladder_ml; }, 0, 1000, "ml",
-            "the bladder is filled to this; 0: as it is");
+            "volume to which the bladder is filled; 0: as it is");
 }
 
 OptionGroup options() {

@@ -25,7 +25,7 @@ void add_grid(OptionsOf<ResampleOptions>& options) {
             "edge of the cooked voxels")
         .sweep({"warp",
                 {"3", "2", "1.5", "1", "0.75"},
-                "surfaces between voxels; memory goes with its cube",
+                "surfaces between voxels; memory falls with the cube of the edge",
                 "voxels finer than the map's own sampling hold nothing new"})
         .sweep({"case",
                 {"3", "2", "1.5", "1", "0.75"},
@@ -58,12 +58,12 @@ void add_shape(OptionsOf<ResampleOptions>& options) {
         .number(
             "volume_iterations", [](auto& o) { return &o.volume_iterations; }, 0, 50, "",
             "Newton steps that keep each label's volume; 0: not kept")
-        .sweep(
-            {"smooth",
-             {"0", "1", "2", "4", "8"},
-             "volume lost by smoothing",
-             "converged after a few steps",
-             "it keeps the volume of each label, of which a mean over all surfaces shows little"})
+        .sweep({"smooth",
+                {"0", "1", "2", "4", "8"},
+                "volume lost by smoothing",
+                "converged after a few steps",
+                "the Newton steps keep the volume of each label, which hardly shows in a mean over "
+                "all surfaces"})
         .toggle(
             "follow_shift", [](auto& o) { return &o.follow_shift; },
             "blend oblique vessels along their shift")
@@ -77,21 +77,20 @@ void add_shape(OptionsOf<ResampleOptions>& options) {
                 "adds records"})
         .choice(
             "block_vx", [](auto& o) { return &o.block_vx; }, {"4", "8", "16"}, "nodes",
-            "edge of the blocks that distances are kept in; affects time and memory alone")
+            "edge of the blocks that hold distances; affects only time and memory")
         .sweep({"warp",
                 {"4", "8", "16"},
-                "time and memory alone",
+                "only time and memory",
                 "which labels can win at a point is decided in every cell of a block"})
         .number(
             "snap_vx", [](auto& o) { return &o.snap_vx; }, 0, 0.5, "voxels",
-            "most that surfaces move onto quadrics, which are short to store; 0: none")
-        .sweep(
-            {"smooth",
-             {"0", "0.03", "0.07", "0.15"},
-             "surfaces inside voxels, against the size of the bundle",
-             "bricks where no quadric is that near are kept as they are",
-             "the size of the bundle, which this page does not measure, falls by it; beyond 0.07 "
-             "voxels surfaces of thin layers begin to show it"});
+            "greatest distance that surfaces move onto quadrics, which take little space; 0: none")
+        .sweep({"smooth",
+                {"0", "0.03", "0.07", "0.15"},
+                "surfaces inside voxels, against the size of the bundle",
+                "bricks where no quadric is that near are kept as they are",
+                "the move onto quadrics reduces the size of the bundle, which this page does not "
+                "measure; beyond 0.07 voxels it begins to show on surfaces of thin layers"});
 }
 
 void add_paper(OptionsOf<ResampleOptions>& options) {

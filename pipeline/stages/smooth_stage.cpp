@@ -41,7 +41,7 @@ void add_joint(OptionsOf<SmoothStageOptions>& options) {
             "joint: reach of the boundary records; 0: none")
         .number(
             "snap_vx", [](auto& o) { return &o.smooth.snap_vx; }, 0, 0.5, "voxels",
-            "joint: most that surfaces move onto quadrics; 0: none");
+            "joint: greatest distance that surfaces move onto quadrics; 0: none");
 }
 
 void add_level_set(OptionsOf<SmoothStageOptions>& options) {

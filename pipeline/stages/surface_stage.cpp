@@ -22,7 +22,7 @@ OptionGroup options() {
     return OptionsOf<SkinSurfaceOptions>("surface")
         .number(
             "working_mm", [](auto& o) { return &o.working_mm; }, 0.5, 20, "mm",
-            "voxel to which the body is averaged for its skin")
+            "edge of the voxels to which the body is averaged to find its skin")
         .sweep({"register",
                 {"8", "5", "3", "2"},
                 "where the skin is",

@@ -25,19 +25,18 @@ void add_align(OptionsOf<Fit>& options) {
         .number(
             "starts", [](auto& o) { return &o.rigid.starts; }, 1, 2000, "",
             "rotations to start from")
-        .sweep(
-            {"register",
-             {"10", "30", "60", "96", "240"},
-             "the chance of a wrong pose",
-             "once one start converges to the right pose, more of them end in the same place",
-             "one start finds this torso, which is told up from down by its hints; a slim body, or "
-             "one without hints, has half turns that fit nearly as well"})
+        .sweep({"register",
+                {"10", "30", "60", "96", "240"},
+                "the chance of a wrong pose",
+                "once one start converges to the right pose, more of them end in the same place",
+                "one start finds this torso, whose hints distinguish up from down; a slim body, or "
+                "one without hints, fits nearly as well after a half turn"})
         .number(
             "offsets", [](auto& o) { return &o.rigid.offsets; }, 1, 20, "",
             "starts along the long axis for each rotation")
         .number(
             "offset_mm", [](auto& o) { return &o.rigid.offset_mm; }, 0, 200, "mm",
-            "distance between those starts")
+            "distance between starts along the long axis")
         .number(
             "candidates", [](auto& o) { return &o.rigid.candidates; }, 1, 50, "",
             "poses handed on to the warp")
@@ -49,10 +48,11 @@ void add_align(OptionsOf<Fit>& options) {
             "standard deviation of a landmark along an axis")
         .choice(
             "open_side", [](auto& o) { return &o.open_side; }, {"auto", "back", "front", "none"},
-            "", "side of the patient that the open side of the sweep is; auto: the back")
+            "", "side of the patient at the open side of the sweep; auto: the back")
         .toggle(
             "find_table", [](auto& o) { return &o.target.find_table; },
-            "recognise readings of the table: left out, its plane holds the back");
+            "recognise readings of the table: they are left out, and the table's plane holds the "
+            "back");
 }
 
 void add_quadratic(OptionsOf<Fit>& options) {
@@ -101,7 +101,7 @@ void add_residual(OptionsOf<Fit>& options) {
             "weight of the residual's stretching")
         .number(
             "inside_mm", [](auto& o) { return &o.residual.inside_mm; }, 0, 100, "mm",
-            "most that the residual may move the inside of the body, on average")
+            "greatest distance that the residual may move the inside of the body, on average")
         .number(
             "fade_mm", [](auto& o) { return &o.residual.fade_mm; }, 1, 500, "mm",
             "depth at which the residual has faded");
@@ -111,7 +111,7 @@ void add_uncertainty(OptionsOf<Fit>& options) {
     options.help_group("What is not known")
         .choice(
             "uncertainty", [](auto& o) { return &o.uncertainty; }, {"on", "off"}, "",
-            "repeat the fit on halves of the readings, to tell what they leave open")
+            "repeat the fit on halves of the readings, to find what they leave uncertain")
         .number(
             "refits", [](auto& o) { return &o.refits; }, 2, 200, "",
             "fits to halves of the readings, where uncertainty is on");
@@ -121,23 +121,23 @@ void add_elastic(OptionsOf<Fit>& options) {
     options.help_group("Elastic warp")
         .number(
             "stiffness", [](auto& o) { return &o.elastic.stiffness; }, 0.01, 100, "",
-            "of all tissues; 0.33 follows the readings closer, 1 keeps organs")
+            "stiffness of all tissues; 0.33 follows the readings more closely, 1 preserves organs")
         .sweep({"elastic",
                 {"3", "1", "0.33", "0.1"},
-                "organs that change in volume, against readings that are not reached",
+                "volume change of organs, against the distance to the readings",
                 "stiffer tissues take no more time"})
         .number(
             "rounds", [](auto& o) { return &o.elastic.rounds; }, 1, 100, "",
             "rounds of matching of the elastic warp")
         .number(
             "cg_iterations", [](auto& o) { return &o.elastic.iterations; }, 1, 1000, "",
-            "conjugate gradients in each of those rounds")
+            "conjugate gradient iterations in each round of matching")
         .sweep({"elastic",
                 {"8", "30", "60"},
                 "how near each round comes to its minimum",
                 "",
-                "another number moves every elastic map, and builds further apart than these two "
-                "have not been fitted with fewer"});
+                "another number changes every elastic map, and builds further apart than these two "
+                "have not been fitted with fewer iterations"});
 }
 
 OptionGroup options() {

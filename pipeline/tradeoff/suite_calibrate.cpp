@@ -76,10 +76,9 @@ Suite calibrate_suite() {
     suite.error_name = "tip error, median of 25 recordings";
     suite.error_unit = "mm";
     suite.truth =
-        "A tool 158 mm long pivots on its tip over a cone of 60 degrees, read with uniform noise "
-        "of +-1 mm, one "
-        "reading in ten off by up to 40 mm. Seconds are those of the fit; the readings cost the "
-        "person 1/60 s each.";
+        "A tool 158 mm long pivots on its tip over a cone of 60 degrees. Its readings have uniform "
+        "noise of +-1 mm, and one reading in ten is off by up to 40 mm. Seconds are those of the "
+        "fit; taking the readings costs the user another 1/60 s each.";
     suite.knobs = {
         {"calibrate.poses",
          {"10", "30", "100", "300", "1000"},
@@ -92,10 +91,10 @@ Suite calibrate_suite() {
          {"10", "20", "40", "60", "90"},
          "60",
          "degrees",
-         "full angle that the tool is tilted over",
+         "full angle of the cone over which the tool is tilted",
          "how well the tip is determined",
          "tilting further costs the fit no time",
-         "a wider cone is hard on the hand, not on the fit"},
+         "a wider cone is hard for the hand, though not for the fit"},
         {"calibrate.trials",
          {"10", "50", "100", "400", "1600"},
          "400",
@@ -103,7 +102,7 @@ Suite calibrate_suite() {
          "random starts of the robust fit",
          "the chance that outliers win",
          "with one outlier in ten, few starts are enough",
-         "one reading in ten is off here; a hand that slips spoils a third of them"},
+         "one reading in ten is off here, but a hand that slips spoils a third of the readings"},
     };
     suite.named = {
         {TrialRole::paper,

@@ -41,11 +41,10 @@ Suite case_suite(const AnalyticBody& body, const std::string& body_name) {
     suite.error_name = "mean displacement of surfaces";
     suite.error_unit = "mm";
     suite.truth =
-        "The whole chain from sampled CT and noisy readings of the mannequin to the cooked volume, "
-        "compared at "
-        "200,000 random points with the analytic anatomy under the known warp. The fit of the skin "
-        "cannot see "
-        "motion inside the body, so this is larger than the error of resampling alone.";
+        "The whole chain runs from sampled CT and noisy readings of the mannequin to the cooked "
+        "volume, which is compared at 200,000 random points with the analytic anatomy under the "
+        "known warp. The fit of the skin cannot see motion inside the body, so this error is "
+        "larger than that of resampling alone.";
     suite.knobs = knobs_of(built_in_stages(), suite.name);
     suite.named = preset_points(built_in_stages());
     suite.measure = [body](const Settings& settings) -> Result<Measured> {
@@ -77,9 +76,8 @@ Suite own_case_suite(const Recipe& recipe) {
     suite.error_name = "mean displacement of surfaces against the finest setting";
     suite.error_unit = "mm";
     suite.truth =
-        "No truth is known for this case: each setting is compared, at 200,000 points of a fixed "
-        "lattice, with the "
-        "preset accurate. What all settings have in common does not show.";
+        "No truth is known for this case, so each setting is compared with the preset accurate at "
+        "200,000 points of a fixed lattice. Errors that all settings share do not show.";
     suite.knobs = knobs_of(built_in_stages(), suite.name);
     suite.named = preset_points(built_in_stages());
     suite.measure = [state](const Settings& settings) -> Result<Measured> {

@@ -56,13 +56,13 @@ Suite cost_suite() {
     auto folder = std::make_shared<TemporaryFolder>();
     Suite suite;
     suite.name = "cost";
-    suite.title = "What a build is said to cost";
+    suite.title = "Predicted cost of a build";
     suite.body = "demo-torso";
-    suite.error_name = "seconds said before the work, off from those taken";
+    suite.error_name = "error of the predicted seconds";
     suite.error_unit = "%";
     suite.truth =
-        "The demo torso is built by a command of its own, which says its processor seconds and its "
-        "peak memory before it begins; both are compared with what it took, writing included.";
+        "A separate command builds the demo torso and predicts its processor seconds and its peak "
+        "memory before it begins; both are compared with what it took, writing included.";
     const char* why = "neither error nor its sign follows the size: it is that of a fitted law";
     suite.knobs = {
         {"cost.voxel_mm",

@@ -65,24 +65,23 @@ Result<Measured> measure_look(const Settings& settings) {
 Suite look_suite() {
     Suite suite;
     suite.name = "look";
-    suite.title = "The look of a machine";
+    suite.title = "A machine measured from a clip";
     suite.body = "synthetic-clip";
-    suite.error_name = "rms error of point spread along, across, and grey";
+    suite.error_name = "rms error of point spread along and across the beam, and of grey";
     suite.error_unit = "%";
     suite.truth =
-        "A clip of plain parenchyma is drawn by a known machine and measured as a real one would "
-        "be; the error is that of the width along the beam, the width across it at 50 mm and the "
-        "grey of the tissue's mean amplitude.";
-    suite.knobs = {
-        {"look.frames",
-         {"1", "2", "4", "16", "48"},
-         "16",
-         "",
-         "frames measured",
-         "chance of the speckle that is seen",
-         "the stand-in's own chance remains: from some frames on, more do not help",
-         "what few frames gain is the chance of one clip, by which more frames differ as "
-         "well"}};
+        "A known machine draws a clip of plain parenchyma, which is measured as a real clip would "
+        "be. The error combines those of the width along the beam, the width across it at 50 mm "
+        "and the grey of the tissue's mean amplitude.";
+    suite.knobs = {{"look.frames",
+                    {"1", "2", "4", "16", "48"},
+                    "16",
+                    "",
+                    "frames measured",
+                    "random variation of the speckle in the clip",
+                    "the stand-in's own chance remains: from some frames on, more do not help",
+                    "the lower error of few frames is chance in this one clip, and larger numbers "
+                    "of frames differ by chance as well"}};
     suite.measure = measure_look;
     return suite;
 }

@@ -89,7 +89,7 @@ Knob voxel_knob() {
             "edge of the cooked voxels",
             "surfaces between voxels",
             "the map itself is of 2 mm: finer voxels hold nothing new",
-            "maps of hospitals are finer than this one, and vessels ask for it"};
+            "hospital maps are finer than this one, and vessels need the finer voxels"};
 }
 
 }  // namespace
@@ -105,10 +105,10 @@ Suite make_suite() {
     suite.truth =
         "A segmentation of the demo torso at 2 mm becomes a case on its own skin, with exercises, "
         "check and pictures, and is compared with the analytic anatomy at 200,000 random points. "
-        "Seconds are those of processors in the first run; in the second, which finds nothing to "
-        "do, they are 0.06. At 4 mm they are more than at 3 mm: needles fit less well between "
-        "coarse voxels, so that `aim` tries 2,354 poses instead of 795 before it has its windows, "
-        "and looking whether a needle would be seen is most of what that takes.";
+        "Seconds are processor seconds of the first run; the second run, which finds nothing to "
+        "do, takes 0.06 s. Voxels of 4 mm take longer than voxels of 3 mm: needles fit less well "
+        "between coarse voxels, so that `aim` tries 2,354 poses instead of 795 before it has its "
+        "windows, and testing whether a needle would be visible takes most of that time.";
     suite.knobs = {voxel_knob()};
     suite.named = preset_points(built_in_stages());
     suite.measure = [study](const Settings& settings) -> Result<Measured> {
@@ -133,10 +133,9 @@ Suite publish_suite() {
     suite.error_name = "mean displacement of surfaces";
     suite.error_unit = "mm";
     suite.truth =
-        "The case of the suite make on a site. Seconds are those that a page waits for it on a "
-        "line of 10 Mbit/s before it can be opened: its first parts and the list of its segments. "
-        "The "
-        "program itself, which a browser keeps, is not counted.";
+        "The case of the suite make is published on a site. Seconds are the time that a page waits "
+        "on a line of 10 Mbit/s before the case can be opened: for its first parts and the list of "
+        "its segments. The program itself, which a browser keeps, is not counted.";
     suite.knobs = {voxel_knob()};
     suite.named = preset_points(built_in_stages());
     suite.measure = [state](const Settings& settings) -> Result<Measured> {

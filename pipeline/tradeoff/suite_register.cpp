@@ -87,15 +87,13 @@ Suite register_suite() {
     suite.error_name = "interior target error, mean";
     suite.error_unit = "mm";
     suite.truth =
-        "The demo torso's skin, from labels at 3 mm, is fitted to 2,000 readings (0.7 mm noise) of "
-        "a mannequin made "
-        "from it by a known rigid motion and a known quadratic warp of 9 mm, with the recipe's up "
-        "direction and 14 markers good to 0.5 mm; the error is the mean "
-        "distance of 2,000 "
-        "points inside the body from where the known map puts them, averaged over six sets of "
-        "readings and markers. Motion along the skin cannot "
-        "be seen by any fit "
-        "of surfaces; the markers see it, and their error is the floor of the curve.";
+        "The skin of the demo torso, from labels at 3 mm, is fitted to 2,000 readings (0.7 mm "
+        "noise) of a mannequin. A known rigid motion and a known quadratic warp of 9 mm make the "
+        "mannequin from the torso. The fit also has the recipe's up direction and 14 markers good "
+        "to 0.5 mm. The error is the mean distance of 2,000 points inside the body from where the "
+        "known map puts them, averaged over six sets of readings and markers. No fit of surfaces "
+        "can see motion along the skin; the markers show it, and their error is the floor of the "
+        "curve.";
     suite.knobs = {{"mannequin.points",
                     {"200", "500", "1000", "2000", "4000"},
                     "2000",
@@ -109,8 +107,8 @@ Suite register_suite() {
                    {TrialRole::peer,
                     "quadratic without residual",
                     {{"warp.residual", "false"}},
-                    "the known warp is a quadratic, so that a residual follows noise; that of "
-                    "another build is none"}};
+                    "the known warp is a quadratic, so that a residual only follows noise; the "
+                    "warp to a mannequin of another build is not a quadratic"}};
     suite.measure = [known](const Settings& settings) { return measure_fit(*known, settings); };
     return suite;
 }
@@ -181,9 +179,10 @@ Suite elastic_suite() {
     suite.error_unit = "%";
     suite.truth =
         "The demo torso's skin, from labels at 3 mm, is fitted to 2,000 readings (1 mm noise) of a "
-        "torso 15 % wider, 20 % deeper and with a belly 28 mm larger, with the head direction, "
-        "navel and pubis. The skin can be reached in many ways; the error is the change of volume "
-        "of the solid organ, or of all bones together, that changes most, in percent.";
+        "torso that is 15 % wider, 20 % deeper and has a belly 28 mm larger. The fit also has the "
+        "head direction, navel and pubis. Many maps reach the skin. The error is the volume "
+        "change, in percent, of the solid organ that changes most; all bones together count as one "
+        "organ.";
     for (Knob& knob : knobs_of(built_in_stages(), suite.name)) suite.knobs.push_back(knob);
     suite.named = {{TrialRole::paper, "paper, eqs. (3)-(9)", {{"warp.paper", "true"}}},
                    {TrialRole::peer, "residual warp", {{"warp.path", "residual"}}}};

@@ -60,11 +60,9 @@ Suite warp_suite() {
     suite.name = "warp";
     suite.title = "Through the warp into cubic voxels";
     suite.truth =
-        "The demo torso sampled at 2 x 2 x 3 mm goes through its known warp; at 200,000 random "
-        "points the "
-        "cooked class is compared with the analytic one, and the share of wrong points divided by "
-        "the "
-        "interface area is the mean distance by which surfaces are displaced.";
+        "The demo torso, sampled at 2 x 2 x 3 mm, goes through its known warp. At 200,000 random "
+        "points the cooked label is compared with the analytic label. The share of wrong points "
+        "divided by the interface area is the mean distance by which surfaces are displaced.";
     suite.knobs = knobs_of(built_in_stages(), suite.name);
     suite.named = {{TrialRole::peer, "nearest label", {{"resample.method", "nearest"}}}};
     return suite;
@@ -75,9 +73,8 @@ Suite smooth_suite() {
     suite.name = "smooth";
     suite.title = "Thick slices without steps";
     suite.truth =
-        "The demo torso sampled at 1 x 1 x 5 mm goes through its known warp into 1 mm; the measure "
-        "is that of "
-        "the suite warp.";
+        "The demo torso, sampled at 1 x 1 x 5 mm, goes through its known warp into voxels of 1 mm; "
+        "the measure is the same as in the suite warp.";
     suite.knobs = knobs_of(built_in_stages(), suite.name);
     suite.pairs = {{"resample.sigma_vx", "resample.volume_iterations"}};
     suite.named = {{TrialRole::paper,
@@ -136,15 +133,15 @@ Suite region_suite() {
     suite.error_name = "mean displacement of surfaces in the box";
     suite.error_unit = "mm";
     suite.truth =
-        "A box of 60 x 60 x 40 mm in the middle of the demo torso, sampled at 1 x 1 x 2 mm and "
-        "cooked at 1 mm; the measure is that of the suite warp, at random points of the box. "
-        "Seconds are those that the region adds.";
+        "A box of 60 x 60 x 40 mm in the middle of the demo torso is sampled at 1 x 1 x 2 mm and "
+        "cooked at 1 mm; the measure is the same as in the suite warp, at random points of the "
+        "box. Seconds are what the region adds.";
     suite.knobs = {{"region.voxel_mm",
                     {"1", "0.5", "0.4", "0.3", "0.25"},
                     kStandard,
                     "mm",
                     "edge of the region's voxels; 1: no region",
-                    "surfaces between voxels; time and memory go with its cube",
+                    "surfaces between voxels; time and memory fall with the cube of the edge",
                     "voxels finer than the map's own sampling hold nothing new"}};
     suite.measure = [known](const Settings& settings) {
         double voxel_mm = std::strtod(kStandard, nullptr);
@@ -200,9 +197,9 @@ Suite pathology_suite() {
     suite.error_name = "volume error, mean";
     suite.error_unit = "%";
     suite.truth =
-        "Ten lesions of 2 ml by seed in the liver of the analytic torso: the volume that the "
-        "painted voxels have against the one asked for; seconds are those of placing and painting "
-        "all ten.";
+        "Ten lesions of 2 ml are placed by seed in the liver of the analytic torso; the error "
+        "compares the volume of the painted voxels with the volume asked for. Seconds are for "
+        "placing and painting all ten.";
     suite.knobs = {{"resample.voxel_mm",
                     {"4", "3", "2", "1.5", "1"},
                     "1.5",

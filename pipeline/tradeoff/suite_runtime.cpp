@@ -217,10 +217,10 @@ Suite effects_suite() {
     suite.error_name = "rms change of all scanned pixels";
     suite.error_unit = "grey";
     suite.truth =
-        "Twelve frames of a sweep over the demo torso are drawn with and without each effect that "
-        "they call for, by one renderer in turn; seconds are processor time of a frame without it, "
-        "the fastest of eight turns. docs/effects.md has the instructions for the scenes of all "
-        "scenarios.";
+        "One renderer draws twelve frames of a sweep over the demo torso in turn with and without "
+        "each effect that they call for. Seconds are the processor time of a frame without that "
+        "effect, the fastest of eight turns. docs/effects.md has the instruction counts for the "
+        "scenes of all scenarios.";
     Knob knob{"effects.left_out",
               {"none"},
               "none",
@@ -300,8 +300,7 @@ Suite render_suite() {
     suite.error_unit = "grey, 8 x 8 pixels averaged";
     suite.truth =
         "Twelve frames of a sweep over the demo torso are compared with the same frames at 768 "
-        "beams of 1024 "
-        "samples; seconds are the median of a frame on one thread.";
+        "beams of 1024 samples. Seconds are the median of a frame on one thread.";
     suite.knobs = {
         {"render.scanlines",
          {"64", "96", "128", "176", "256", "384"},
@@ -328,15 +327,15 @@ Suite render_suite() {
          {"0", "8", "17", "30"},
          "17",
          "",
-         "width of the face that listens",
+         "width of the receiving aperture",
          "the penumbra of shadows",
          "costs one pass over the light of all samples, as much at every width but 0"},
         {"render.equalisation",
          {"0", "0.25", "0.5", "1"},
          "1",
          "",
-         "how far a beam's gain goes to its neighbours'",
-         "upright columns in the liver: of shadows, and of bright and dark places",
+         "how far a beam's gain is moved towards its neighbours'",
+         "vertical columns in the liver, from shadows and from bright and dark places",
          "costs the sum of cells and a product of all samples, as much at every amount but 0"},
         {"render.speckle_reduction",
          {"0", "0.15", "0.3", "0.6"},
@@ -412,9 +411,9 @@ Suite press_suite(const std::string& data) {
     suite.error_name = "mean displacement error";
     suite.error_unit = "mm";
     suite.truth =
-        "Displacements of a nonlinear finite element model at up to 8 mm of pressing, mean over "
-        "the blocks of the data folder; seconds are the fastest of twenty solutions, look-ups in "
-        "the finite elements included.";
+        "The truth is the displacement of a nonlinear finite element model at up to 8 mm of "
+        "pressing; the error is the mean over the blocks of the data folder. Seconds are those of "
+        "the fastest of twenty solutions, including look-ups in the finite elements.";
     suite.knobs = {{"press.increments",
                     {"1", "2", "3", "4", "8"},
                     "3",
@@ -426,8 +425,8 @@ Suite press_suite(const std::string& data) {
                     {"3", "6", "12", "24", "48"},
                     "12",
                     "",
-                    "conjugate gradients in each step, a third more in the first",
-                    "what is left of the linear system's error",
+                    "conjugate gradient iterations in each step, a third more in the first",
+                    "remaining error of the linear system",
                     "the model's own error is reached at twelve"}};
     suite.pairs = {{"press.increments", "press.iterations"}};
     // The path may name the folder of the blocks or the one that contains it.
@@ -471,10 +470,9 @@ Suite colour_suite() {
     suite.error_name = "noise of the velocity";
     suite.error_unit = "of the Nyquist velocity";
     suite.truth =
-        "A tube of 8 mm with 480 mL/min at 55 degrees, in a box of a third of a sector; the "
-        "standard deviation of its cells over forty frames. Seconds are the fastest of them. What "
-        "pulses cost a machine "
-        "is its frame rate, in the notes.";
+        "A tube of 8 mm carries 480 mL/min at 55 degrees, in a box of a third of a sector; the "
+        "error is the standard deviation of its cells over forty frames. Seconds are those of the "
+        "fastest frame. More pulses lower the machine's frame rate, which the notes give.";
     suite.knobs = {{"colour.ensemble",
                     {"4", "6", "8", "10", "12", "16"},
                     "10",
@@ -487,7 +485,7 @@ Suite colour_suite() {
                     "2",
                     "",
                     "frames whose noise is blended",
-                    "nothing: its noise lasts longer and is as large",
+                    "nothing: the noise lasts longer and is as large",
                     "draws are kept from frame to frame"}};
     suite.measure = [](const Settings& settings) {
         return measure("colour " + value_of(settings, "colour.ensemble", "10") + " " +
@@ -504,9 +502,9 @@ Suite spectrum_suite() {
     suite.error_name = "rms error of the peak velocity";
     suite.error_unit = "of the true one";
     suite.truth =
-        "The same tube with an artery's pulse, a gate of 4 mm in its middle: 24 times 5 s of "
-        "spectrum. Seconds are those "
-        "of one line, of which there are 200 a second; the bias is in the notes.";
+        "The same tube carries an artery's pulse, with a gate of 4 mm in its middle; the error is "
+        "the rms error of the peak velocity in 24 times 5 s of spectrum. Seconds are for one line "
+        "of the spectrum, of which there are 200 each second; the notes give the bias.";
     suite.knobs = {{"spectrum.gate_points",
                     {"8", "16", "32", "64", "128", "256"},
                     "64",
@@ -562,16 +560,15 @@ Suite fluid_suite() {
     suite.error_name = "rms error of the volume";
     suite.error_unit = "%";
     suite.truth =
-        "An ellipsoid of 3.7 litres without bowel, filled to 2, 10, 30 and 60 % in 27 postures; "
-        "its "
-        "volume below the level is known in closed form. Seconds are those of one level, which is "
-        "sought whenever volume or posture change.";
+        "An ellipsoid of 3.7 litres without bowel is filled to 2, 10, 30 and 60 % in 27 postures; "
+        "its volume below the level is known in closed form. Seconds are for finding one level, "
+        "which happens whenever volume or posture changes.";
     suite.knobs = {{"fluid.points",
                     {"1250", "5000", "20000", "80000"},
                     std::to_string(FreeFluidPlace::kPoints),
                     "",
                     "points that are counted",
-                    "volume that the fluid seems to have",
+                    "apparent volume of the fluid",
                     "how much is left is kept as a number of its own: draining stays exact"}};
     suite.measure = [](const Settings& settings) -> Result<Measured> {
         return measure_fluid(std::stoi(value_of(settings, "fluid.points", "20000")));
@@ -587,10 +584,10 @@ Suite camera_suite() {
     suite.error_name = "rms error of the probe's face";
     suite.error_unit = "mm";
     suite.truth =
-        "Sixty rendered pictures of 65 degrees across, a body of 40 mm held at random 0.6 m away, "
-        "its face 120 mm from it; poses of which a second one fits nearly as well do not count, "
-        "the notes say how many are sure. Seconds are those of one body in one picture, detection "
-        "round it included, on one core.";
+        "Sixty rendered pictures of 65 degrees across show a body of 40 mm held at random 0.6 m "
+        "away, with the probe's face 120 mm from it. Poses for which a second pose fits nearly as "
+        "well do not count; the notes give the number of sure poses. Seconds are for one body in "
+        "one picture on one core, including detection round it.";
     suite.knobs = {{"camera.width_px",
                     {"640", "960", "1280", "1920"},
                     "1280",
@@ -598,13 +595,13 @@ Suite camera_suite() {
                     "width of the pictures",
                     "how closely corners are found",
                     "at 1920 every second pixel is searched, as in the player",
-                    "JPEG and the search for a tool that is out of view cost by the pixel, and few "
-                    "cameras give thirty pictures of 1920 a second"},
+                    "the costs of JPEG and of the search for a tool that is out of view grow with "
+                    "the pixels, and few cameras give thirty pictures of 1920 a second"},
                    {"camera.fit_pixels",
                     {"0", "150", "300", "600", "1200"},
                     "600",
                     "",
-                    "pixels of a tag that its pattern is laid over; 0: lines along its edges",
+                    "pixels of a tag that its pattern is fitted to; 0: lines along its edges",
                     "noise of the corners",
                     "tags at 0.6 m have little more than 600 pixels"},
                    {"camera.tags",

@@ -48,10 +48,9 @@ Suite texture_suite() {
     suite.error_name = "grain";
     suite.error_unit = "rms of autocorrelations";
     suite.truth =
-        "Liver, muscle and fat are learned from examples and synthesised; the error is the rms "
-        "difference "
-        "between the autocorrelation of example and texture within the grain's width, averaged "
-        "over the three.";
+        "The textures of liver, muscle and fat are learned from examples and synthesised. The "
+        "error is the rms difference between the autocorrelations of example and texture within "
+        "the grain's width, averaged over the three tissues.";
     suite.knobs = knobs_of(built_in_stages(), suite.name);
     suite.named = {{TrialRole::paper,
                     "paper, eq. (15), 32 voxels",

@@ -144,7 +144,7 @@ std::string trial_rows(const std::vector<Trial>& trials) {
 
 std::string why_standard(const Beaten& beaten) {
     return beaten.why_standard.empty() ? "No reason is known to keep it."
-                                       : "It stays: " + beaten.why_standard + ".";
+                                       : "The standard stays because " + beaten.why_standard + ".";
 }
 
 std::string beaten_text(const Suite& suite, const std::vector<Beaten>& beaten) {
@@ -219,7 +219,7 @@ std::string markdown_section(const PageInput& input, const Suite& suite) {
     const std::vector<Trial> trials = trials_of(input, suite);
     std::string text =
         markdown_heading(suite) + "\n" + suite.truth + " Measured on " + input.machine +
-        ".\n\n| knob | standard | meaning | error it trades | value: " + suite.error_unit +
+        ".\n\n| knob | standard | meaning | error traded for time | value: " + suite.error_unit +
         ", s |\n|---|---|---|---|---|\n";
     for (const Knob& knob : suite.knobs) {
         text += "| `" + knob.key + "` | " + knob.standard +
@@ -322,14 +322,15 @@ std::string overview_table(const std::string& parts) {
 std::string format_accuracy_markdown(const PageInput& input, const std::string& before) {
     const std::string opening =
         "# What accuracy costs\n\n"
-        "Written by `scripts/accuracy` from the table of knobs and a sweep (`sonocase tradeoff`); "
-        "do not edit.\n"
-        "Seconds are those of processors, all threads together, unless a part says otherwise; each "
-        "part names its machine.\n\n"
+        "`scripts/accuracy` writes this page from the table of knobs and a sweep (`sonocase "
+        "tradeoff`); do not edit it.\n"
+        "Seconds are processor seconds of all threads together, unless a part states otherwise; "
+        "each part names its machine.\n\n"
         "![error against seconds](pictures/accuracy.png)\n\n"
-        "Lower and further left is better; both axes are logarithmic. Red: the paper's own "
-        "method. Blue: the front, of which no setting tried is beaten in both. Below, one line for "
-        "each part: how large the error is, and in how many seconds.\n";
+        "A point that lies lower and further left is better; both axes are logarithmic. Red is the "
+        "paper's own method. Blue is the Pareto front: no other setting tried is both faster and "
+        "more accurate. The table below has one line for each part, with its error and its "
+        "seconds.\n";
     std::string text;
     // Parts that this sweep has, in the places of those before; the others as they were.
     const std::string options = options_table();
