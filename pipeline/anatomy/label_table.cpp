@@ -125,6 +125,8 @@ Result<LabelTable> table_of_rows(const std::vector<TextRow>& rows,
                                               "label_value", "label value", "label id"});
         name_column = column_named(
             rows[0], {"name", "structure", "label_name", "label name", "segment", "label"});
+        if (name_column == value_column)  // "id,label": there the label is the name
+            value_column = column_named(rows[0], {"index", "id", "key", "number"});
         tissue_column = column_named(rows[0], {"tissue", "tissue_class"});
         if (value_column < 0 || name_column < 0 || name_column == value_column)
             return Error{"label table has no columns 'value' and 'name'",
@@ -157,6 +159,8 @@ Result<LabelTable> table_of_rows(const std::vector<TextRow>& rows,
         if (!value)
             return Error{"'" + cell_at(rows[r], value_column) + "' is not a label value", place,
                          "expected a whole number"};
+        if (entry.name.size() > 2 && entry.name.front() == '\'' && entry.name.back() == '\'')
+            entry.name = entry.name.substr(1, entry.name.size() - 2);
         if (entry.name.empty())
             return Error{"value " + std::to_string(*value) + " has no name", place,
                          "expected value,name"};
@@ -203,6 +207,39 @@ LabelTable table_of_objects(const detail::Json& list) {
     return table;
 }
 
+// The segments of dcmqi's description of a DICOM segmentation: a list for each map that it was made
+// of, each with objects of labelID, SegmentLabel and codes.
+Result<LabelTable> table_of_segments(const detail::Json& maps, const std::string& where) {
+    LabelTable table;
+    for (const detail::Json& map : maps)
+        for (const detail::Json& segment : map.is_array() ? map : detail::Json::array({map})) {
+            LabelTableEntry entry;
+            if (!segment.is_object()) continue;
+            const auto text_of = [](const detail::Json& of, const char* key) {
+                const auto found = of.find(key);
+                return found != of.end() && found->is_string() ? found->get<std::string>()
+                                                               : std::string();
+            };
+            for (const char* key : {"SegmentLabel", "SegmentDescription"})
+                if (entry.name.empty()) entry.name = trimmed(text_of(segment, key));
+            if (const auto code = segment.find("SegmentedPropertyTypeCodeSequence");
+                entry.name.empty() && code != segment.end() && code->is_object())
+                entry.name = trimmed(text_of(*code, "CodeMeaning"));
+            const auto value = segment.find("labelID");
+            if (value == segment.end() || !value->is_number_integer() || entry.name.empty())
+                return Error{"a segment has no labelID or no name", where,
+                             "expected SegmentLabel and labelID in each of segmentAttributes"};
+            entry.value = value->get<int>();
+            for (const LabelTableEntry& other : table)
+                if (other.value == entry.value)
+                    return Error{"two segments have the labelID " + std::to_string(entry.value) +
+                                     ": '" + other.name + "' and '" + entry.name + "'",
+                                 where, "the segments of several maps: give a table for each"};
+            table.push_back(std::move(entry));
+        }
+    return table;
+}
+
 // {"labels": {"liver": 5}}, {"labels": {"5": "liver"}}, {"labels": ["background", ...]}, or the
 // inner object alone.
 Result<LabelTable> parse_label_json(std::string_view text, const std::string& where) {
@@ -212,6 +249,9 @@ Result<LabelTable> parse_label_json(std::string_view text, const std::string& wh
     detail::Json root;
     if (!detail::parse_json(text, root, fault))
         return fault.error ? *fault.error : Error{"is not JSON", where, expected};
+    if (const auto segments = root.find("segmentAttributes");
+        segments != root.end() && segments->is_array() && !segments->empty())
+        return table_of_segments(*segments, where);
     const auto found = root.find("labels");
     const detail::Json& labels = found != root.end() ? *found : root;
     LabelTable table;

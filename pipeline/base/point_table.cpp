@@ -117,19 +117,6 @@ bool is_one_of(std::string_view word, std::initializer_list<std::string_view> wo
     return std::find(words.begin(), words.end(), word) != words.end();
 }
 
-// mm per unit; 0 for a word that is no unit of length.
-double unit_of(std::string_view word) {
-    const std::string unit = lower_case(word);
-    if (is_one_of(unit, {"mm", "millimeter", "millimeters", "millimetre", "millimetres"})) return 1;
-    if (is_one_of(unit, {"cm", "centimeter", "centimeters", "centimetre", "centimetres"}))
-        return 10;
-    if (is_one_of(unit, {"m", "meter", "meters", "metre", "metres"})) return 1000;
-    if (is_one_of(unit, {"in", "inch", "inches"})) return 25.4;
-    if (is_one_of(unit, {"um", "micrometer", "micrometers", "micrometre", "micrometres"}))
-        return 0.001;
-    return 0;
-}
-
 // What a column is called: a kind of name, the axis, and the unit that stands in it.
 struct ColumnName {
     enum Kind { none, plain, t, p, position, ras, lps, normal, status, flag, source, name };
@@ -154,7 +141,7 @@ ColumnName column_name(std::string_view cell) {
     }
     ColumnName name;
     if (words.size() > 1) {
-        name.unit_mm = unit_of(words.back());
+        name.unit_mm = length_unit_mm(words.back());
         if (name.unit_mm > 0) words.pop_back();
     }
     if (words.empty()) return name;
@@ -164,7 +151,7 @@ ColumnName column_name(std::string_view cell) {
     const std::string& last = words.back();
     if (words.size() == 1) {
         if (is_one_of(last, {"status", "state"})) return {ColumnName::status, 0, 0};
-        if (is_one_of(last, {"valid", "isvalid", "visible", "tracked", "detected"}))
+        if (is_one_of(last, {"valid", "isvalid", "visible", "tracked", "detected", "defined"}))
             return {ColumnName::flag, 0, 0};
         if (is_one_of(last, {"sensor", "station", "tool", "marker", "device", "probe"}))
             return {ColumnName::source, 0, 0};
@@ -228,7 +215,8 @@ struct Columns {
     std::array<std::size_t, 3> point{0, 1, 2};
     std::array<int, 3> normal{-1, -1, -1};
     int status = -1, flag = -1, source = -1, name = -1;
-    std::size_t count = 0;  // of the line of names
+    std::size_t count = 0;   // of the line of names
+    bool fiducials = false;  // of 3D Slicer: version 5 writes more cells than names
     double unit_mm = 0;
     Axes axes = Axes::unsaid;
     bool has_normals() const { return normal[0] >= 0 && normal[1] >= 0 && normal[2] >= 0; }
@@ -246,6 +234,15 @@ struct Heading {
             of[name.kind][static_cast<std::size_t>(name.axis)].push_back(c);
             if (name.kind == ColumnName::ras && name.axis == 2) of[ColumnName::lps][2].push_back(c);
         }
+        // The table of markups that 3D Slicer saves: what is not visible there is hidden in a view.
+        const auto has = [&](std::string_view word) {
+            for (std::size_t c = 0; c < cells.size(); ++c)
+                if (lower_case(cells[c]) == word) return true;
+            return false;
+        };
+        if (has("defined") || has("selected") || has("locked"))
+            std::erase_if(of[ColumnName::flag][0],
+                          [&](std::size_t c) { return lower_case(cells[c]) == "visible"; });
     }
     bool complete(ColumnName::Kind kind) const {
         return !of[kind][0].empty() && !of[kind][1].empty() && !of[kind][2].empty();
@@ -300,10 +297,13 @@ Result<std::optional<Columns>> columns_named(const std::vector<Line>& lines,
                                              const std::string& where) {
     const Line& line = lines[at];
     std::string_view text = line.text;
+    bool fiducials = false;
     if (line.comment)
         if (const std::size_t key = text.find("columns"); key != text.npos)
-            if (const std::size_t equals = text.find('=', key); equals != text.npos)
+            if (const std::size_t equals = text.find('=', key); equals != text.npos) {
                 text = text.substr(equals + 1);
+                fiducials = text.find("associatedNodeID") != text.npos;
+            }
     Cells cells;
     cells.split(text, separator);
     std::vector<ColumnName::Kind> kinds = Heading(cells).kinds();
@@ -319,6 +319,7 @@ Result<std::optional<Columns>> columns_named(const std::vector<Line>& lines,
                      "call those of the position x, y and z and the others something else"};
     Columns columns;
     columns.named = true;
+    columns.fiducials = fiducials;
     columns.count = cells.given();  // OptiTrack leaves the last name empty
     auto of = heading.of[kinds[0]];
     if ((of[0].size() > 1 || of[1].size() > 1 || of[2].size() > 1) &&
@@ -492,8 +493,8 @@ class Parser {
         cells_.split(line.text, separator_of(line.text));
         for (std::size_t n = 0; n + 1 < cells_.size(); ++n)
             if (is_one_of(lower_case(cells_[n]), {"length units", "units", "unit"}) &&
-                unit_of(cells_[n + 1]) > 0)
-                layout_.unit_mm = unit_of(cells_[n + 1]);
+                length_unit_mm(cells_[n + 1]) > 0)
+                layout_.unit_mm = length_unit_mm(cells_[n + 1]);
         return Done{};
     }
 
@@ -565,7 +566,7 @@ class Parser {
             std::string word(cells_[layout_.columns.point[axis]]);
             std::erase_if(word,
                           [](char c) { return c == '[' || c == ']' || c == '(' || c == ')'; });
-            unit[axis] = unit_of(word);
+            unit[axis] = length_unit_mm(word);
         }
         if (unit[0] <= 0 || unit[0] != unit[1] || unit[0] != unit[2]) return;
         layout_.columns.unit_mm = unit[0];
@@ -663,7 +664,7 @@ class Parser {
             if (lines_[n].comment) continue;
             cells_.split(lines_[n].text, layout_.separator);
             const bool blanks_shift = layout_.separator == ' ' && cells_.size() != columns.count;
-            if (cells_.size() > columns.count || blanks_shift) {
+            if ((cells_.size() > columns.count && !columns.fiducials) || blanks_shift) {
                 bool missing = false;
                 for (std::size_t c = 0; c < cells_.size(); ++c)
                     missing = missing || lower_case(cells_[c]) == "missing";
@@ -799,6 +800,18 @@ class Parser {
 
 }  // namespace
 
+double length_unit_mm(std::string_view word) {
+    const std::string unit = lower_case(word);
+    if (is_one_of(unit, {"mm", "millimeter", "millimeters", "millimetre", "millimetres"})) return 1;
+    if (is_one_of(unit, {"cm", "centimeter", "centimeters", "centimetre", "centimetres"}))
+        return 10;
+    if (is_one_of(unit, {"m", "meter", "meters", "metre", "metres"})) return 1000;
+    if (is_one_of(unit, {"in", "inch", "inches"})) return 25.4;
+    if (is_one_of(unit, {"um", "micrometer", "micrometers", "micrometre", "micrometres"}))
+        return 0.001;
+    return 0;
+}
+
 Result<PointTable> parse_point_table(std::string_view text,
                                      const std::string& where,
                                      const PointTableOptions& options) {
@@ -825,11 +838,11 @@ Result<PointTable> parse_markups(std::string_view json, const std::string& where
             const auto words = markup.texts_or_none("coordinateUnits");
             if (fault.error) {
                 fault.error.reset();
-                unit = unit_of(markup.text("coordinateUnits"));
+                unit = length_unit_mm(markup.text("coordinateUnits"));
             } else {
-                unit = words.empty() ? 0 : unit_of(words[0]);
+                unit = words.empty() ? 0 : length_unit_mm(words[0]);
                 for (const std::string& other : words)
-                    if (unit_of(other) != unit) unit = 0;
+                    if (length_unit_mm(other) != unit) unit = 0;
             }
             if (unit <= 0)
                 return Error{"the unit of the coordinates is not known", where,

@@ -39,8 +39,8 @@ struct PointTableOptions {
 // are x, y, z and unit normals, or x, y, z and colours of whole numbers up to 255. Four or seven
 // below a line with their number are a scanner's (PTS): x, y, z, intensity and a colour.
 //
-// Rows that a column status, state, valid or tracked calls bad have no position, nor have those of
-// 0, 0, 0 where there are several, and of numbers beyond 1e12 (NDI).
+// Rows that a column status, state, valid, tracked or defined calls bad have no position, nor have
+// those of 0, 0, 0 where there are several, and of numbers beyond 1e12 (NDI).
 //
 // Errors name file and line: text that is not UTF-8; rows of two sensors by a column of that name;
 // columns whose meaning is not certain, with the meanings that are possible and the line to add;
@@ -55,6 +55,9 @@ Result<PointTable> parse_markups(std::string_view json, const std::string& where
 // Reads the file as one or the other by its name.
 Result<PointTable> load_point_table(const std::string& path, const PointTableOptions& options = {});
 bool is_markups_file(std::string_view path);  // .mrk.json
+
+// mm per unit of a word such as "cm"; 0: it is no unit of length.
+double length_unit_mm(std::string_view word);
 
 // In mm and RAS+. scale: mm per unit, told by hand; 1: as the file says. told: axes told by hand.
 // Normals are turned too.

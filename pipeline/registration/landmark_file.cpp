@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "formats/files/atomic_file.h"
 #include "pipeline/base/point_table.h"
@@ -13,19 +16,78 @@
 namespace sonocase::pipeline::inline registration {
 namespace {
 
-// False: the row does not name all columns.
-bool find_columns(const TextRow& header, std::array<std::size_t, 7>& column) {
-    constexpr const char* kNames[] = {"name", "ct_x", "ct_y", "ct_z", "x", "y", "z"};
-    std::array<std::size_t, 7> found{};
-    for (std::size_t n = 0; n < 7; ++n) {
-        const auto cell = std::find_if(header.cells.begin(), header.cells.end(), [&](auto& c) {
-            return lower_case(c) == kNames[n] || lower_case(c) == std::string(kNames[n]) + "_mm";
-        });
-        if (cell == header.cells.end()) return false;
-        found[n] = static_cast<std::size_t>(cell - header.cells.begin());
+// Where a row holds a mark's name and its places, by body.
+struct LandmarkColumns {
+    struct Place {
+        std::array<std::size_t, 3> column{};
+        double unit_mm = 1;
+        Axes axes = Axes::unsaid;
+    };
+    std::size_t name = 0;
+    Place ct{{1, 2, 3}}, mannequin{{4, 5, 6}};
+};
+
+// "ct_x", "CT L (cm)", "mannequin_y", "z_mm". False: the cell names no coordinate.
+bool read_coordinate(std::string_view cell, bool* of_ct, int* axis, double* unit_mm, Axes* axes) {
+    std::vector<std::string> words(1);
+    for (const char c : lower_case(cell)) {
+        if (std::isalnum(static_cast<unsigned char>(c)))
+            words.back() += c;
+        else if (!words.back().empty())
+            words.emplace_back();
     }
-    column = found;
-    return true;
+    if (words.back().empty()) words.pop_back();
+    *unit_mm = 1;
+    if (words.size() > 1 && length_unit_mm(words.back()) > 0) {
+        *unit_mm = length_unit_mm(words.back());
+        words.pop_back();
+    }
+    if (words.empty() || words.size() > 2 || words.back().size() != 1) return false;
+    const char letter = words.back()[0];
+    for (const auto& [letters, meant] : {std::pair<std::string_view, Axes>{"xyz", Axes::unsaid},
+                                         {"ras", Axes::ras},
+                                         {"lps", Axes::lps}}) {
+        const std::size_t at = letters.find(letter);
+        if (at == letters.npos) continue;
+        *axis = static_cast<int>(at);
+        *axes = letter == 's' ? Axes::unsaid : meant;  // the third of both
+        const std::string body = words.size() == 2 ? words[0] : "mannequin";
+        *of_ct = body == "ct" || body == "patient" || body == "scan" || body == "image";
+        return *of_ct || body == "mannequin" || body == "surface" || body == "phantom";
+    }
+    return false;
+}
+
+// Empty: the row does not name each column once.
+std::optional<LandmarkColumns> find_columns(const TextRow& header) {
+    LandmarkColumns found;
+    int names = 0;
+    std::array<int, 6> seen{};
+    for (std::size_t c = 0; c < header.cells.size(); ++c) {
+        const std::string cell = lower_case(header.cells[c]);
+        if (cell == "name" || cell == "label" || cell == "landmark") {
+            found.name = c;
+            ++names;
+        }
+        bool of_ct = false;
+        int axis = 0;
+        double unit_mm = 1;
+        Axes axes = Axes::unsaid;
+        if (!read_coordinate(cell, &of_ct, &axis, &unit_mm, &axes)) continue;
+        LandmarkColumns::Place& place = of_ct ? found.ct : found.mannequin;
+        int& first = seen[of_ct ? 0 : 3];
+        if (first + seen[of_ct ? 1 : 4] + seen[of_ct ? 2 : 5] > 0 && place.unit_mm != unit_mm)
+            return std::nullopt;
+        if (axes != Axes::unsaid && place.axes != Axes::unsaid && axes != place.axes)
+            return std::nullopt;
+        place.column[static_cast<std::size_t>(axis)] = c;
+        place.unit_mm = unit_mm;
+        if (axes != Axes::unsaid) place.axes = axes;
+        ++seen[static_cast<std::size_t>(axis + (of_ct ? 0 : 3))];
+    }
+    if (names != 1 || std::any_of(seen.begin(), seen.end(), [](int n) { return n != 1; }))
+        return std::nullopt;
+    return found;
 }
 
 Result<PointTable> load_marks(const std::string& path) {
@@ -52,31 +114,38 @@ Result<std::vector<Landmark>> parse_landmarks(std::string_view csv, const std::s
     SONOCASE_TRY_DONE(expect_utf8(csv, where));
     std::vector<Landmark> landmarks;
     bool first = true;
-    std::array<std::size_t, 7> column{0, 1, 2, 3, 4, 5, 6};
+    LandmarkColumns columns;
+    const char* expected = "rows are name,ct_x,ct_y,ct_z,x,y,z in mm";
     for (const TextRow& row : split_rows(csv)) {
         const std::string at = where + ":" + std::to_string(row.line);
-        const char* expected = "rows are name,ct_x,ct_y,ct_z,x,y,z in mm";
         if (row.cells.size() < 7) {
             return Error{"landmark row of " + std::to_string(row.cells.size()) + " cells", at,
                          expected};
         }
-        double value[6] = {};
         std::size_t numbers = 0;
-        for (std::size_t c = 0; c < 6; ++c) {
-            const std::optional<double> v = column[c + 1] < row.cells.size()
-                                                ? number_in(row.cells[column[c + 1]])
-                                                : std::nullopt;
-            if (v && std::isfinite(*v)) {
-                value[c] = *v;
+        const auto read = [&](const LandmarkColumns::Place& place) {
+            Point3 point;
+            for (int axis = 0; axis < 3; ++axis) {
+                const std::size_t column = place.column[static_cast<std::size_t>(axis)];
+                const std::optional<double> v =
+                    column < row.cells.size() ? number_in(row.cells[column]) : std::nullopt;
+                if (!v || !std::isfinite(*v)) continue;
+                point[axis] = place.unit_mm * *v;
                 ++numbers;
             }
-        }
+            return to_ras(point, place.axes);
+        };
+        const Point3 ct = read(columns.ct), mannequin = read(columns.mannequin);
         if (numbers == 0 && first) {  // the header
             first = false;
-            if (!find_columns(row, column) && row.cells.size() > 7)
+            const auto named = find_columns(row);
+            if (!named)
                 return Error{"landmarks of " + std::to_string(row.cells.size()) +
                                  " columns: which are the coordinates?",
-                             at, "call them name,ct_x,ct_y,ct_z,x,y,z, in any order"};
+                             at,
+                             "call them name,ct_x,ct_y,ct_z,x,y,z, in any order; l, p, s or r, a, "
+                             "s in place of x, y, z, and cm or m where they are not mm (ct_l_cm)"};
+            columns = *named;
             continue;
         }
         if (first && row.cells.size() > 7)
@@ -87,11 +156,10 @@ Result<std::vector<Landmark>> parse_landmarks(std::string_view csv, const std::s
         first = false;
         if (numbers < 6) {
             return Error{
-                "landmark '" + row.cells[column[0]] + "' has a coordinate that is not a number", at,
-                expected};
+                "landmark '" + row.cells[columns.name] + "' has a coordinate that is not a number",
+                at, expected};
         }
-        landmarks.push_back(
-            {row.cells[column[0]], {value[0], value[1], value[2]}, {value[3], value[4], value[5]}});
+        landmarks.push_back({row.cells[columns.name], ct, mannequin});
     }
     if (landmarks.empty()) {
         return Error{"no landmark found", where, "rows are name,ct_x,ct_y,ct_z,x,y,z in mm"};

@@ -14,8 +14,10 @@
 
 namespace sonocase::pipeline::inline registration {
 
-// A header row is allowed; one that names all six coordinates says their order. Errors name file
-// and line.
+// A header row names the columns, in any order: ct_x (or patient_, scan_, image_) on the patient, x
+// or mannequin_x (surface_, phantom_) on the mannequin; l, p, s and r, a, s are axes too, and a
+// unit may stand behind ("ct_x_cm"). Errors name file and line: a header that does not name each of
+// the seven once; rows that hold no six numbers.
 Result<std::vector<Landmark>> parse_landmarks(std::string_view csv, const std::string& where);
 // surface_path: the marks on the surface where `path` holds those of the patient alone; marks are
 // paired by name, and those that one file lacks are an error. Empty: `path` holds pairs.

@@ -36,6 +36,26 @@ std::vector<std::string> mesh_files(const std::string& path) {
     return files;
 }
 
+// An OBJ's `o` and `g` lines, or the `solid` lines of an STL in text: a file is one node.
+std::string objects_of(const std::string& path) {
+    const std::string ending = lower_case(fs::path(path).extension().string());
+    if (ending != ".obj" && ending != ".stl") return {};
+    const auto text = read_text_file(path);
+    if (!text) return {};
+    std::set<std::string_view> names;
+    for (std::string_view rest = *text; !rest.empty();) {
+        const std::size_t end = std::min(rest.find('\n'), rest.size());
+        const std::string_view line = trimmed(rest.substr(0, end));
+        rest.remove_prefix(std::min(end + 1, rest.size()));
+        if (ending == ".obj" ? line.starts_with("o ") || line.starts_with("g ")
+                             : line.starts_with("solid "))
+            names.insert(line.substr(line.find(' ') + 1));
+    }
+    if (names.size() < 2) return {};
+    return fs::path(path).filename().string() + " holds " + std::to_string(names.size()) +
+           " objects, which are not told apart: save each as a file of its own, or all as GLB";
+}
+
 // Nodes of one label.
 struct Organ {
     NodeRow row;
@@ -72,6 +92,7 @@ class Collector {
             const NodeRow* row = table_.find(node.name);
             if (row == nullptr) {
                 unmapped_.push_back(node.name);
+                if (objects_.empty() && !glb) objects_ = objects_of(path);
                 continue;
             }
             if (row->role == NodeRole::skip) continue;
@@ -95,6 +116,8 @@ class Collector {
     }
     const std::vector<std::string>& aside() const { return aside_; }
     const std::vector<std::string>& unmapped() const { return unmapped_; }
+    // A sentence on a file without a row that holds several objects; empty: none does.
+    const std::string& objects() const { return objects_; }
     std::vector<Organ>& organs() { return organs_; }
     int nodes() const { return nodes_; }
 
@@ -124,6 +147,7 @@ class Collector {
     const MeshOptions& options_;
     std::vector<Organ> organs_;
     std::vector<std::string> unmapped_, aside_;
+    std::string objects_;
     std::map<std::string, std::vector<std::string>> said_;  // names of files by their axes
     std::string sentence_;
     int nodes_ = 0;
@@ -279,7 +303,10 @@ Result<MeshBody> read_meshes(const std::string& path,
     if (!collector.unmapped().empty()) {
         return Error{std::to_string(collector.unmapped().size()) +
                          " nodes have no row in the table: " + excerpt(collector.unmapped(), 8),
-                     table_path, "add rows for them, with the role skip if they are not wanted"};
+                     table_path,
+                     collector.objects().empty()
+                         ? "add rows for them, with the role skip if they are not wanted"
+                         : collector.objects()};
     }
     MeshBody body;
     body.attribution = table.attribution;

@@ -585,6 +585,19 @@ void leave_out_common_parts(std::vector<Structure>& structures, std::vector<Note
 }
 
 // Reads a folder of binary masks; every value other than 0 is inside.
+// The value in the name of a mask that is called by its number alone: "5", "seg-5", "label_005".
+std::optional<int> number_of_mask(std::string_view stem) {
+    const std::size_t last = stem.find_last_not_of("0123456789");
+    const std::string_view digits = last == stem.npos ? stem : stem.substr(last + 1);
+    std::string word = lower_case(stem.substr(0, stem.size() - digits.size()));
+    while (!word.empty() && std::string_view("-_ .").find(word.back()) != std::string_view::npos)
+        word.pop_back();
+    for (const char* plain : {"", "seg", "segment", "label", "mask", "value", "class", "structure"})
+        if (word == plain && !digits.empty() && digits.size() < 9)
+            return static_cast<int>(number_in(digits).value_or(0));
+    return std::nullopt;
+}
+
 Result<StructureList> read_mask_folder(const std::string& folder, const ImportOptions& options) {
     std::vector<std::string> files;
     std::error_code code;
@@ -631,10 +644,22 @@ Result<StructureList> read_mask_folder(const std::string& folder, const ImportOp
         list.structures.push_back(std::move(structure));
     }
     leave_out_common_parts(list.structures, list.notes);
+    const auto row_of = [&](const std::string& path, const std::string& name) {
+        auto row = std::find_if(table.begin(), table.end(),
+                                [&](const LabelTableEntry& entry) { return entry.name == name; });
+        if (const auto number = number_of_mask(volume_stem(path)); row == table.end() && number)
+            row = std::find_if(table.begin(), table.end(), [&](const LabelTableEntry& entry) {
+                return entry.value == *number;
+            });
+        return row;
+    };
+    bool matched = table.empty();
     for (std::size_t n = 0; n < files.size(); ++n) {
         LabelTableEntry& own = list.structures[n].entry;
-        for (const LabelTableEntry& entry : table)
-            if (entry.name == own.name) own = entry;
+        if (const auto row = row_of(files[n], own.name); row != table.end()) {
+            own = *row;
+            matched = true;
+        }
         if (own.value == 0) own.value = totalsegmentator_value(own.name);
         for (std::size_t m = 0; m < n; ++m)
             if (list.structures[m].entry.name == own.name)
@@ -644,6 +669,12 @@ Result<StructureList> read_mask_folder(const std::string& folder, const ImportOp
                              folder,
                              "keep one of them in the folder, or give it a name of its own"};
     }
+    if (!matched)
+        return Error{"no row of the table is about a mask of the folder, such as '" +
+                         list.structures.front().entry.name + "'",
+                     options.table,
+                     "expected rows value,name with the masks' file names as names, or with the "
+                     "numbers of files such as seg-5.nii.gz as values"};
     SONOCASE_TRY_DONE(join_masks(first_grid, places, folder, list));
     leave_out_background(list);
     // Names that TotalSegmentator does not define get values above its own.

@@ -215,6 +215,12 @@ TEST_F(LabelNames, BlanksWithinNamesBelongToThem) {
               "# Color table\n0 Nothing 0 0 0 0\n2 kidney right 1 2 3 255\n"
               "3 kidney left 1 2 4 255\n5 liver 1 2 5 255\n"},
           {"tabs.tsv", "2\tkidney right\n3\tkidney left\n5\tliver\n"},
+          {"id.csv", "id,label\n2,kidney right\n3,kidney left\n5,liver\n"},
+          {"index.csv", "label,index\n'kidney right',2\n'kidney left',3\n'liver',5\n"},
+          {"dcmqi.json",
+           "{\"segmentAttributes\":[[{\"labelID\":2,\"SegmentLabel\":\"kidney right\"},"
+           "{\"labelID\":3,\"SegmentDescription\":\"kidney left\"}],"
+           "[{\"labelID\":5,\"SegmentedPropertyTypeCodeSequence\":{\"CodeMeaning\":\"liver\"}}]]}"},
           {"heading.txt", "value name\n2 kidney right\n3 kidney left\n5 liver\n"},
           {"commas.csv", "sep=,\nvalue,name\n2,kidney, right\n3,kidney, left\n5,liver\n5,liver\n"},
           {"list.json",
@@ -403,6 +409,28 @@ TEST(MaskFolder, WhatAllMasksOfAFolderShareIsNoPartOfTheirNames) {
     folder.write("k/kidney_right.nii", mask_of(kKidneyRight));
     EXPECT_EQ(names_in(import_label_map(folder / "k")),
               (std::vector<std::string>{"kidney_left", "kidney_right"}));
+}
+
+// As converters of DICOM segmentations name them: by the value alone.
+TEST(MaskFolder, MasksThatAreCalledByNumberTakeNamesFromATable) {
+    const TemporaryFolder folder;
+    ImportOptions options;
+    options.table = folder.write("t.csv", "value,name\n1,spleen\n2,kidney_right\n5,liver\n");
+    for (const char* front : {"", "seg-", "Segment_00", "label "}) {
+        const std::string in = std::string("m") + front + "/";
+        folder.write(in + front + "5.nii", mask_of(kLiver));
+        folder.write(in + front + "1.nii", mask_of(kSpleen));
+        folder.write(in + front + "2.nii", mask_of(kKidneyRight));
+        const auto imported = import_label_map(folder / in, options);
+        EXPECT_EQ(names_in(imported), (std::vector<std::string>{"kidney_right", "liver", "spleen"}))
+            << front;
+        EXPECT_EQ(names_of(imported)[5], "liver") << front;
+    }
+    // A table of other names and numbers is not left unused without a word.
+    options.table = folder.write("other.csv", "value,name\n7,heart\n");
+    const auto unused = import_label_map(folder / "mseg-", options);
+    ASSERT_FALSE(unused);
+    EXPECT_NE(unused.error().message().find("no row of the table"), std::string::npos);
 }
 
 TEST(MaskFolder, MasksThatCannotBeMeantAreToldOf) {

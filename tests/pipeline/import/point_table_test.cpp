@@ -80,6 +80,13 @@ TEST(PointTable, FindsColumnsByTheirNames) {
          "# Markups fiducial file version = 4.11\n# CoordinateSystem = RAS\n"
          "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n" +
              rows("%n,", ",0,0,0,1,1,1,0,F-%n,,", ",")},
+        {"fcsv of Slicer 5, with two cells more than names",
+         "# Markups fiducial file version = 5.6\n# CoordinateSystem = RAS\n"
+         "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n" +
+             rows("%n,", ",0,0,0,1,0,1,0,F-%n,,vtkMRMLScalarVolumeNode1,2,0", ",")},
+        {"Slicer's table of markups, all hidden",
+         "label,r,a,s,defined,selected,visible,locked,description\n" +
+             rows("F-%n,", ",1,1,0,0,", ",") + "F-11,0,0,0,0,1,1,0,\n"},
         {"NDI", "Tools,Port 1,Frame,State,Q0,Qx,Qy,Qz,Tx,Ty,Tz,Error\n" +
                     rows("1,P,%n,OK,1,0,0,0,", ",0.1", ",")},
         {"German", "sep=;\nname;x;y;z\n" + with_commas(rows("p%n;", "", ";"))},

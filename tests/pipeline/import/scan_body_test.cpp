@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -105,6 +106,49 @@ TEST(ScanBody, a_scan_of_another_place_or_without_hounsfield_units_is_refused) {
     refused = fill_from_scan(mr.scan, "mr", mr.imported);
     ASSERT_FALSE(refused);
     EXPECT_NE(refused.error().expected.find("Hounsfield"), std::string::npos);
+}
+
+// The shared CT as it is, mirrored along each axis, and 20 and 40 mm aside: the body is found, but
+// not the patient's.
+TEST(ScanBody, a_scan_that_does_not_lie_on_the_labels_is_named) {
+    const std::string ct = SONOCASE_DATA "/ct";
+    if (!std::filesystem::exists(ct)) GTEST_SKIP() << "shared/data/ct is absent";
+    const auto imported = import_label_map(ct + "/labels_source.nii.gz");
+    const auto scan = read_scan(ct + "/ct.nii.gz");
+    ASSERT_TRUE(imported && scan);
+    const Int3 size = scan->grid.size;
+    // x, y and z of the voxel that is taken in place of each; beyond the scan the nearest.
+    const auto named = [&](auto&& from) {
+        ScanVolume other = *scan;
+        for (int k = 0; k < size.z; ++k)
+            for (int j = 0; j < size.y; ++j)
+                for (int i = 0; i < size.x; ++i) {
+                    const Int3 at = from(Int3{i, j, k});
+                    other.values[scan->grid.index(i, j, k)] = scan->values[scan->grid.index(
+                        std::clamp(at.x, 0, size.x - 1), std::clamp(at.y, 0, size.y - 1),
+                        std::clamp(at.z, 0, size.z - 1))];
+                }
+        ImportedLabels filled = *imported;
+        filled.report.warnings.clear();
+        const auto done = fill_from_scan(other, "ct", filled);
+        if (!done) return done.error().what + "; " + done.error().expected;
+        return filled.report.warnings.empty() ? std::string() : filled.report.warnings[0];
+    };
+    EXPECT_EQ(named([](Int3 v) { return v; }), "");
+    EXPECT_EQ(named([](Int3 v) { return Int3{v.x + 1, v.y, v.z}; }), "");  // 3 mm: not told
+    const char* likely = "is the scan mirrored, upside down or of another examination?";
+    const auto told = [&](const char* what, const std::string& said) {
+        EXPECT_NE(said.find(likely), std::string::npos) << what << ": " << said;
+    };
+    told("right and left", named([&](Int3 v) { return Int3{size.x - 1 - v.x, v.y, v.z}; }));
+    told("front and back", named([&](Int3 v) { return Int3{v.x, size.y - 1 - v.y, v.z}; }));
+    told("upside down", named([&](Int3 v) { return Int3{v.x, v.y, size.z - 1 - v.z}; }));
+    for (const int by : {7, -7, 13, -13}) {
+        told("x", named([&](Int3 v) { return Int3{v.x + by, v.y, v.z}; }));
+        told("y", named([&](Int3 v) { return Int3{v.x, v.y + by, v.z}; }));
+    }
+    for (const int by : {13, -13})
+        told("z", named([&](Int3 v) { return Int3{v.x, v.y, v.z + by}; }));
 }
 
 // The map that the shared data were completed to by another program, by the same rule.

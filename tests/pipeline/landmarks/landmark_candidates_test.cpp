@@ -122,6 +122,33 @@ TEST(LandmarkFile, ColumnsGoByTheirNamesInAnyOrder) {
               std::string::npos);
 }
 
+TEST(LandmarkFile, TheHeaderSaysBodiesAxesAndUnits) {
+    const auto first = [](const std::string& csv) {
+        const auto read = parse_landmarks(csv, "a.csv");
+        EXPECT_TRUE(read) << read.error().message();
+        return read ? read->at(0) : Landmark{};
+    };
+    const Landmark lps = first("name,ct_l,ct_p,ct_s,x,y,z\nnavel,1,2,3,4,5,6\n");
+    EXPECT_EQ(lps.ct, (Point3{-1, -2, 3}));
+    EXPECT_EQ(lps.mannequin, (Point3{4, 5, 6}));
+    const Landmark swapped =
+        first("name,mannequin_x,mannequin_y,mannequin_z,ct_x,ct_y,ct_z\nnavel,4,5,6,1,2,3\n");
+    EXPECT_EQ(swapped.ct, (Point3{1, 2, 3}));
+    EXPECT_EQ(swapped.mannequin, (Point3{4, 5, 6}));
+    const Landmark units =
+        first("Landmark;CT X (cm);CT Y (cm);CT Z (cm);R;A;S\nnavel;1;2;3;4;5;6\n");
+    EXPECT_EQ(units.ct, (Point3{10, 20, 30}));
+    EXPECT_EQ(units.mannequin, (Point3{4, 5, 6}));
+    // Names that leave open which body is which, which axis, or which unit.
+    for (const char* header : {"name,x,y,z,x,y,z", "name,a1,a2,a3,b1,b2,b3",
+                               "name,ct_x,ct_y,ct_z,x,y,w", "name,ct_x_cm,ct_y,ct_z,x,y,z",
+                               "name,ct_l,ct_a,ct_s,x,y,z", "mark,ct_x,ct_y,ct_z,x,y,z"}) {
+        const auto read = parse_landmarks(std::string(header) + "\nnavel,1,2,3,4,5,6\n", "a.csv");
+        ASSERT_FALSE(read) << header;
+        EXPECT_NE(read.error().message().find("which are the coordinates?"), std::string::npos);
+    }
+}
+
 TEST(LandmarkFile, TwoListsOfMarksArePairedByName) {
     const testing::TemporaryFolder folder;
     const std::string patient =

@@ -82,6 +82,16 @@ TEST_F(MeshFolder, ListsNodesWithoutARowAndRefusesSheets) {
     EXPECT_NE(refusal("organ_a,liver,orgen\n").find("did you mean 'organ'"), std::string::npos);
 }
 
+// One file with an object for each organ is one node: a row for it would weld them into one.
+TEST_F(MeshFolder, SaysThatObjectsOfAFileAreNotToldApart) {
+    std::ofstream(folder_ / "all.obj") << "o liver\nv 0 0 0\nv 50 0 0\nv 0 50 0\nv 0 0 50\n"
+                                          "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+                                          "o spleen\nv 90 0 0\nv 120 0 0\nv 90 30 0\nv 90 0 30\n"
+                                          "f 5 7 6\nf 5 6 8\nf 6 7 8\nf 7 5 8\n";
+    const std::string said = refusal("node,label,role\nliver,liver,organ\nspleen,spleen,organ\n");
+    EXPECT_NE(said.find("all.obj holds 2 objects"), std::string::npos) << said;
+}
+
 TEST_F(MeshFolder, SaysThatTheUnitIsWrong) {
     write("a.glb", {{"a", ball_mesh({0, 0, 0}, 0.1), ""}});
     EXPECT_NE(refusal("a,liver,organ\n").find("these look like metres: give --scale 1000"),
