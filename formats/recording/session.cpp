@@ -21,6 +21,7 @@ constexpr const char* kPressField = "Press";
 constexpr const char* kDopplerField = "Doppler";
 constexpr const char* kProbeAgeField = "ProbeAge";
 constexpr const char* kNeedleAgeField = "NeedleAge";
+constexpr const char* kUnseenField = "Unseen";
 constexpr double kHeldS = 0.02;  // a pose this old was not measured for its frame
 
 struct HeaderField {
@@ -236,6 +237,7 @@ Result<Session> session_from_sequence(const Sequence& sequence,
                 sample.has_doppler = read_doppler(field.value, sample.doppler);
             if (field.name == kProbeAgeField) read_age(field.value, sample.probe_age_s);
             if (field.name == kNeedleAgeField) read_age(field.value, sample.needle_age_s);
+            if (field.name == kUnseenField) sample.unseen = field.value == "1";
             if (field.name == kActField) sample.acts = acts_of(field.value);
             if (field.name == kEventField) read_events(field.value, sample, session.events);
         }
@@ -270,6 +272,7 @@ SequenceFrame frame_from_sample(const SessionSample& sample,
         frame.fields.push_back({kProbeAgeField, number_text(sample.probe_age_s, 4)});
     if (sample.needle_ok && sample.needle_age_s > kHeldS)
         frame.fields.push_back({kNeedleAgeField, number_text(sample.needle_age_s, 4)});
+    if (sample.unseen) frame.fields.push_back({kUnseenField, "1"});
     if (!sample.settings.empty()) frame.fields.push_back({kSettingsField, sample.settings});
     if (sample.has_press) frame.fields.push_back({kPressField, press_text(sample.press)});
     if (sample.has_doppler) frame.fields.push_back({kDopplerField, doppler_text(sample.doppler)});

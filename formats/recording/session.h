@@ -70,7 +70,8 @@ struct SessionSample {
     PressSample press;
     bool has_doppler = false;  // a Doppler mode was on
     DopplerSample doppler;
-    ActList acts;  // of a procedure; none in older recordings
+    ActList acts;         // of a procedure; none in older recordings
+    bool unseen = false;  // the picture on the screen was frozen: nobody saw this one
 };
 
 // Events have fixed names; `detail` holds "key=value" words. docs/metrics.md lists them.

@@ -61,7 +61,7 @@ std::shared_ptr<const Exercise> as_written(const Exercise& exercise) {
 // One sample, and what is worked out from it.
 struct ProcedureRun::Facts {
     double time_s = 0, dt_s = 0;
-    bool probe_ok = false, needle_ok = false;
+    bool probe_ok = false, needle_ok = false, unseen = false;
     Rigid probe, needle;
     Point3 tip, tip_rest;
     Vector3 direction;
@@ -270,7 +270,7 @@ bool ProcedureRun::in(const Regions& regions, const Facts& f) const {
 }
 
 bool ProcedureRun::shown(const Regions& regions, double at_least, const Facts& f) {
-    if (!f.probe_ok) return false;
+    if (!f.probe_ok || f.unseen) return false;
     for (std::size_t r = 0; r < regions_.size() && r < 64; ++r) {
         if ((regions.targets >> r & 1) == 0 || fluid_of(r) >= 0) continue;
         const Point3 now =
@@ -734,7 +734,7 @@ void ProcedureRun::perform(int step, double time_s) {
 
 void ProcedureRun::update(const SessionSample& sample) {
     update(sample.time_s, sample.probe_ok, sample.mannequin_from_probe, sample.needle_ok,
-           sample.mannequin_from_drawn, sample.has_press, sample.press, sample.acts);
+           sample.mannequin_from_drawn, sample.has_press, sample.press, sample.acts, sample.unseen);
 }
 
 void ProcedureRun::update(double time_s,
@@ -744,7 +744,8 @@ void ProcedureRun::update(double time_s,
                           const Rigid& mannequin_from_drawn,
                           bool has_press,
                           const PressSample& press,
-                          const ActList& acts) {
+                          const ActList& acts,
+                          bool unseen) {
     new_steps_ = new_complications_ = 0;
     if (!given() || !std::isfinite(time_s)) return;
     Facts f;
@@ -760,6 +761,7 @@ void ProcedureRun::update(double time_s,
     f.force_n = as_recorded(press.force_n);
     f.vein_open = as_recorded(press.vein_open);
     f.acts = &acts;
+    f.unseen = unseen;
     looked_now_ = false;
     show_pools(pushed_);
     if (f.needle_ok) {
@@ -783,7 +785,7 @@ void ProcedureRun::update(double time_s,
                 f.region = static_cast<int>(r);
             }
         }
-        if (f.probe_ok && f.depth_mm > 0) {
+        if (f.probe_ok && f.depth_mm > 0 && !unseen) {
             const Rigid probe_from = inverse(f.probe);
             f.tip_in_view =
                 sight_.tip_visible(f.probe, probe_from * f.tip, probe_from.rotation * f.direction,

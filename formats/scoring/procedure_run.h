@@ -195,7 +195,8 @@ class ProcedureRun {
                 const Rigid& mannequin_from_drawn,
                 bool has_press,
                 const PressSample& press,
-                const ActList& acts);
+                const ActList& acts,
+                bool unseen = false);  // SessionSample::unseen
     void update(const SessionSample& sample);
 
     const ProcedureState& state() const { return state_; }

@@ -41,6 +41,10 @@ struct LookUp {
             read_in_picture(sample.mannequin_from_probe, point.time_s, t,
                             probe_from_mannequin * direction,
                             probe_from_mannequin * point.pose.rotation.column(0), &r);
+            if (sample.unseen) {
+                r.tip_in_view = false;
+                r.in_beam_mm = 0;
+            }
         }
         return r;
     }
@@ -327,6 +331,7 @@ void score_targets_scanned(const ScoreInput& input,
     int scanned = 0, seen = 0;
     for (const TrackPoint& point : input.probe.points) {
         if (centres.empty() && parts.empty()) break;
+        if (input.session.samples[point.sample].unseen) continue;
         const Rigid probe_from = inverse(point.pose);
         const auto near = [&](Point3 c, double radius) {
             const Point3 p = probe_from * c;

@@ -199,7 +199,8 @@ std::span<const LiveEvent> SessionMonitor::update(double time_s,
                                                   bool probe_ok,
                                                   const Rigid& mannequin_from_probe,
                                                   bool needle_ok,
-                                                  const Rigid& mannequin_from_drawn) {
+                                                  const Rigid& mannequin_from_drawn,
+                                                  bool unseen) {
     events_.clear();
     frame_ = frame;
     if (!started_) {
@@ -224,7 +225,7 @@ std::span<const LiveEvent> SessionMonitor::update(double time_s,
         }
     }
     tip_in_view_ = false;
-    if (probe_ok && needle_ok) {
+    if (probe_ok && needle_ok && !unseen) {
         const Rigid probe_from = inverse(mannequin_from_probe);
         tip_in_view_ =
             sight_.tip_visible(mannequin_from_probe, probe_from * tip,
@@ -232,7 +233,7 @@ std::span<const LiveEvent> SessionMonitor::update(double time_s,
                                probe_from * mannequin_from_drawn.rotation.column(0), time_s);
     }
     if (anatomy_ && needle_ok) watch_needle(time_s, mannequin_from_drawn);
-    watch_targets(time_s, probe_ok, mannequin_from_probe, needle_ok, tip);
+    watch_targets(time_s, probe_ok && !unseen, mannequin_from_probe, needle_ok, tip);
     last_time_s_ = std::max(last_time_s_, time_s);
     return events_;
 }

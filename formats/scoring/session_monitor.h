@@ -63,14 +63,15 @@ class SessionMonitor {
                    const std::vector<Label>& labels,
                    const ScoreOptions& options = {});
 
-    // The events of this sample; valid until the next call. Cost: one walk along the inserted shaft
-    // and the targets that are still open.
+    // The events of this sample; valid until the next call. unseen: SessionSample::unseen. Cost:
+    // one walk along the inserted shaft and the targets that are still open.
     std::span<const LiveEvent> update(double time_s,
                                       std::int64_t frame,
                                       bool probe_ok,
                                       const Rigid& mannequin_from_probe,
                                       bool needle_ok,
-                                      const Rigid& mannequin_from_drawn);
+                                      const Rigid& mannequin_from_drawn,
+                                      bool unseen = false);
 
     // What the procedure found in the sample just given: ProcedureRun::new_steps() and its like.
     void report_procedure(std::uint32_t new_steps, std::uint32_t new_complications);

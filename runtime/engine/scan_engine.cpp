@@ -83,11 +83,7 @@ void ScanEngine::observe(const TrackerReading& given, bool is_device) {
     // Each sensor by itself: relative to a reference that moves, a pose that is repeated changes.
     if (places.reference >= 0) feed(reference_watch_, places.reference);
     force_watch_.observe(reading.force_n, reading.time_s);
-    if (reading.restarts) {
-        procedure_.begin();
-        procedure_shift_s_ = 0;
-        waiting_act_count_ = 0;
-    }
+    if (reading.restarts) begin_procedure();
     for (int i = 0; i < std::min(reading.acts.count, ActList::kMaxActs); ++i)
         (void)act(reading.acts.acts[static_cast<std::size_t>(i)]);
     reading_ = reading;
@@ -105,6 +101,12 @@ void ScanEngine::observe(const TrackerReading& given, bool is_device) {
     if (!tools.has_needle || hold_needle)
         tools.mannequin_from_needle = tools_.mannequin_from_needle;
     tools_ = tools;
+}
+
+void ScanEngine::begin_procedure() {
+    procedure_.begin();
+    procedure_shift_s_ = 0;
+    waiting_act_count_ = 0;
 }
 
 void ScanEngine::pass_over(std::span<const SessionSample> samples) {

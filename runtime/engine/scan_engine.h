@@ -86,6 +86,7 @@ struct FrameRecord {
     std::uint32_t new_steps = 0, new_complications = 0;  // ProcedureRun's, as bits
     double reading_time_s = 0;
     bool skin_not_fitted = false;  // the probe touches skin that was not fitted; see SkinFit
+    bool unseen = false;           // the picture on the screen is frozen; set by who shows it
 };
 
 struct EngineOptions {
@@ -114,6 +115,7 @@ class ScanEngine {
     // the others say, and both are with the reference; so is one at exactly the identity among
     // others, which senders give for none.
     void observe(const TrackerReading& reading, bool is_device);
+    void begin_procedure();  // as if nothing had been done yet
     // After a reading that restarts: takes the procedure through the samples that a recording or a
     // script holds before it, so that state, list and moments are those of playing it. Renders
     // nothing. Cost: an update of the procedure for each, and the press where they do not hold it.
@@ -217,6 +219,7 @@ void fill_sample(const FrameRecord& record, Sample& sample) {
     sample.has_press = record.press.solved;
     sample.press = {record.press.force_n, record.press.pressure_kpa, record.press.vein_open};
     sample.acts = record.acts;
+    sample.unseen = record.unseen;
 }
 
 }  // namespace sonocase::runtime::inline engine

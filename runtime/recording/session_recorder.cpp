@@ -112,6 +112,7 @@ struct SessionRecorder::Impl {
         sample.has_doppler = f.doppler.on;
         sample.doppler = doppler_sample(f.doppler, labels);
         sample.acts = f.acts;
+        sample.unseen = f.unseen;
         sample.settings.assign(f.settings.data(), ::strnlen(f.settings.data(), f.settings.size()));
         std::vector<SessionEvent> events;
         for (std::size_t i = 0; i < record.event_count; ++i) {

@@ -35,6 +35,7 @@ struct RecordedFrame {
     PressSample press;
     DopplerReport doppler;
     ActList acts;
+    bool unseen = false;
     // The console's settings as text (settings_text.h) where they changed; empty otherwise.
     std::array<char, 640> settings{};
 };

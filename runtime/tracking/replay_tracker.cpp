@@ -189,6 +189,7 @@ bool ReplayTracker::poll(double now_s, TrackerReading& reading) {
         const auto& samples = recording_.samples;
         while (passed_ < samples.size() && samples[passed_].time_s < from_s) ++passed_;
     }
+    if (back && recording_.in_mannequin) reading.restarts = true;
     while (acted_ < recording_.acts.size() && recording_.acts[acted_].time_s <= until_s) {
         const ActList& acts = recording_.acts[acted_].acts;
         // What does not fit comes with the next reading.

@@ -59,7 +59,7 @@ void PageSession::observe(const FrameRecord& record) {
         sample.settings = settings_text(input.settings);
     settings_ = input.settings;
     monitor_.update(sample.time_s, sample.frame, sample.probe_ok, sample.mannequin_from_probe,
-                    sample.needle_ok, sample.mannequin_from_drawn);
+                    sample.needle_ok, sample.mannequin_from_drawn, sample.unseen);
     report_punctures(record.puncture, monitor_);
     monitor_.report_procedure(record.new_steps, record.new_complications);
     const std::span<const LiveEvent> events = monitor_.events();
@@ -308,6 +308,17 @@ FrameStatus PagePlayer::frame(double now_s, const ImageSettings& settings) {
     keep(record, now_s);
     if (session_) session_->observe(record);
     return status;
+}
+
+void PagePlayer::frame_unseen(double now_s, const ImageSettings& settings) {
+    if (!session_) return;
+    TrackerReading reading;
+    if (hands_->poll(now_s, reading)) engine_->observe(reading, false);
+    unseen_.resize(pixels_.size());
+    (void)engine_->frame(now_s, settings, unseen_);
+    FrameRecord record = engine_->last();
+    record.unseen = true;
+    session_->observe(record);
 }
 
 void PagePlayer::keep(const FrameRecord& record, double now_s) {

@@ -184,6 +184,8 @@ class PagePlayer {
 
     // The picture of now; observed by the attempt, if one runs.
     FrameStatus frame(double now_s, const ImageSettings& settings);
+    // The same behind a frozen picture, for an attempt alone: pixels() and the kept ones stay.
+    void frame_unseen(double now_s, const ImageSettings& settings);
     // A kept picture of the last 20 seconds, `back` pictures before the newest, 0 to kept() - 1.
     FrameStatus frame_again(int back, const ImageSettings& settings);
     int kept() const {
@@ -257,6 +259,7 @@ class PagePlayer {
     std::vector<FrameRecord> kept_;  // ring
     std::size_t kept_next_ = 0, kept_count_ = 0;
     double kept_last_s_ = -1;
+    std::vector<std::uint8_t> unseen_;
 };
 
 }  // namespace sonocase::runtime::inline web

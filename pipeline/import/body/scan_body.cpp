@@ -288,7 +288,8 @@ Status check_scan(const LabelVolume& labels,
         return Error{text("the scan covers %.0f %% of what is labelled",
                           100.0 * static_cast<double>(covered) / static_cast<double>(labelled)),
                      where, "expected the scan that the labels were drawn on"};
-    if (std::none_of(scan.values.begin(), scan.values.end(), [](int hu) { return hu < -700; }))
+    if (std::none_of(scan.values.begin(), scan.values.end(),
+                     [](int value) { return value < -700; }))
         return Error{text("nothing in the scan is as thin as air: its values within the labels are "
                           "%d to %d",
                           range[0], range[1]),

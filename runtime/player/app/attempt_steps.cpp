@@ -116,12 +116,14 @@ void observe_frames(const std::shared_ptr<Attempt>& attempt,
             if (attempt)
                 attempt->observe(frame.record, frame.width_px, frame.height_px, frame.layout,
                                  frame.pixels);
+            if (frame.record.unseen) return;
             if (server) {
                 serve_frame(*server, frame.record, frame.layout, frame.width_px, frame.height_px,
                             unix_seconds(), frame.pixels);
             }
             if (poses) serve_poses(*poses, frame.record);
-        });
+        },
+        attempt != nullptr);
 }
 
 void start_attempt(
@@ -169,6 +171,7 @@ void start_attempt(
     if (scan.tracker.paced && scan.tracker.spec.starts_with("sweep:"))
         scan.tracker.paced->stand_at_end(true);
     training.attempt = std::make_shared<Attempt>(*loaded.open, exercise, std::move(*run), started);
+    training.attempt_from_s = now_s;
     training.score.reset();
     training.result.reset();
     training.unkept = std::move(unkept);
@@ -183,6 +186,7 @@ void finish_attempt(PlayerState& player, CaseState& loaded, ScanState& scan) {
     Training& training = scan.training;
     if (!training.attempt) return;
     const std::shared_ptr<Attempt> attempt = std::move(training.attempt);
+    training.attempt_from_s = -1e9;
     if (scan.tracker.paced) scan.tracker.paced->stand_at_end(false);
     observe_frames(nullptr, scan.servers, *loaded.scan);
     set_exact(player, loaded, scan.console, false);
@@ -228,6 +232,15 @@ bool toggle_attempt(PlayerState& player, CaseState& loaded, ScanState& scan) {
     return training.result.has_value();
 }
 
+namespace {
+
+// What is played begins with an empty list, whatever was done before it.
+void begin_procedure(CaseState& loaded) {
+    loaded.scan->with_engine([](ScanEngine& engine) { engine.begin_procedure(); });
+}
+
+}  // namespace
+
 bool start_replay(PlayerState& player, CaseState& loaded, ScanState& scan) {
     const Training& training = scan.training;
     if (training.attempt || !training.score || training.score_file.empty() || scan.replay.runs())
@@ -242,6 +255,7 @@ bool start_replay(PlayerState& player, CaseState& loaded, ScanState& scan) {
     scan.replay.recorded = session_replay(scan.training.score_file);
     scan.replay.settings_before = scan.console.controls.settings;
     scan.replay.frame = 0;
+    begin_procedure(loaded);
     return true;
 }
 
@@ -252,7 +266,10 @@ bool watch_expert(PlayerState& player,
     if (scan.training.attempt || scan.replay.runs()) return false;
     scan.replay.tracker_before = scan.tracker.spec;
     choose_tracker(player, loaded, scan.tracker, "sweep:" + sweep);
-    if (scan.tracker.paced) return true;
+    if (scan.tracker.paced) {
+        begin_procedure(loaded);
+        return true;
+    }
     choose_tracker(player, loaded, scan.tracker, std::exchange(scan.replay.tracker_before, {}));
     return false;
 }

@@ -142,9 +142,10 @@ void ScanThread::set_calibrations(const Calibrations& calibrations) {
     if (engine_) engine_->set_calibrations(calibrations);
 }
 
-void ScanThread::set_observer(FrameObserver observer) {
+void ScanThread::set_observer(FrameObserver observer, bool unseen) {
     const std::lock_guard lock(mutex_);
     observer_ = std::move(observer);
+    observes_unseen_ = unseen && observer_;
 }
 
 void ScanThread::set_controls(const ScanControls& controls) {
@@ -177,10 +178,12 @@ void ScanThread::run() {
         // A script is a function of time and always has a new pose: it is polled at the idle rate,
         // like breathing and noise. Without an engine, or while nothing is to be rendered, there is
         // nothing to be in time for.
-        double wait_s = rendered ? 1 / kIdleRate
-                        : resting_
-                            ? kRestingWait
-                            : std::clamp(last_frame_s_ + 1 / kIdleRate - clock_(), 5e-4, 0.1);
+        double wait_s =
+            rendered ? 1 / kIdleRate
+            : resting_ && !observes_unseen_
+                ? kRestingWait
+                : std::clamp(std::max(last_frame_s_, last_unseen_s_) + 1 / kIdleRate - clock_(),
+                             5e-4, 0.1);
         // A recording is polled when its next reading is due.
         if (next_reading_s_ >= 0) wait_s = std::clamp(next_reading_s_ - clock_(), 0.0, wait_s);
         wake_condition_.wait_for(lock, duration<double>(wait_s), [this] { return work_ || stop_; });
@@ -217,6 +220,27 @@ bool ScanThread::poll_tracker(double now_s) {
         reading_.acts = {};
     }
     return arrived;
+}
+
+// An attempt goes on behind a frozen picture: tools move and act, and nobody sees them.
+void ScanThread::observe_unseen(double now_s) {
+    last_unseen_s_ = now_s;
+    const RenderOptions& options = engine_->render_options();
+    unseen_.width_px = options.width_px;
+    unseen_.height_px = options.height_px;
+    unseen_.pixels.resize(static_cast<std::size_t>(options.width_px) * options.height_px);
+    unseen_.status = engine_->frame(now_s, controls_.settings, unseen_.pixels);
+    unseen_.record = engine_->last();
+    unseen_.record.unseen = true;
+    unseen_.layout = engine_->renderer().layout();
+    if (waiting_) {
+        unseen_.record.tools = {};
+        unseen_.record.needle = {};
+    }
+    observer_(unseen_);
+    // The card shows what was done.
+    const FrameRecord& record = unseen_.record;
+    redraw_ = redraw_ || record.acts.count > 0 || record.new_steps != 0;
 }
 
 // A frozen picture is rendered again from its record.
@@ -282,6 +306,9 @@ bool ScanThread::step() {
 
 bool ScanThread::render(double now_s) {
     const bool arrived = poll_tracker(now_s);
+    if (controls_.frozen && cine_count_ > 0 && observes_unseen_ &&
+        (arrived || now_s - last_unseen_s_ >= 0.98 / kIdleRate))
+        observe_unseen(now_s);
     if (controls_.frozen && !redraw_) return false;
     if (controls_.resting && !arrived && !redraw_) return false;
     if (!controls_.frozen && !arrived && !redraw_ && now_s - last_frame_s_ < 0.98 / kIdleRate) {

@@ -73,7 +73,8 @@ class ScanThread {
     void set_tracker(std::shared_ptr<Tracker> tracker);
     void set_tools(const ToolNames& tools);  // of the tracker in use
     void set_calibrations(const Calibrations& calibrations);
-    void set_observer(FrameObserver observer);
+    // unseen: it is also given frames behind a frozen picture, FrameRecord::unseen.
+    void set_observer(FrameObserver observer, bool unseen = false);
     // Runs `use` between two frames; false when there is no engine.
     bool with_engine(const std::function<void(ScanEngine&)>& use);
     void set_controls(const ScanControls& controls);
@@ -100,6 +101,7 @@ class ScanThread {
     void take_controls();
     bool render(double now_s);        // if a frame is due
     bool poll_tracker(double now_s);  // true: a new reading
+    void observe_unseen(double now_s);
     void render_kept(ScanFrame& out);
     void describe(ScanFrame& out, double now_s) const;
     void count_live(const ScanFrame& out, double now_s, bool arrived);
@@ -116,6 +118,9 @@ class ScanThread {
     std::shared_ptr<Tracker> tracker_;
     Calibrations calibrations_;
     FrameObserver observer_;
+    bool observes_unseen_ = false;
+    ScanFrame unseen_;  // behind a frozen picture
+    double last_unseen_s_ = -1;
     SoundSink sound_;
     Mailbox<ScanControls> controls_box_;
     ScanControls controls_;

@@ -167,6 +167,7 @@ struct StepsDone {
 
 struct Training {
     std::shared_ptr<Attempt> attempt;   // running; shared with the scan thread
+    double attempt_from_s = -1e9;       // on the session clock; frames before are not of it
     bool exam = false;                  // the attempt that runs or ran last gives no help
     int hints_shown = 0;                // of the exercise's in this attempt; one more: the targets
     int hint_step = -1;                 // present step of the procedure as the last one was shown

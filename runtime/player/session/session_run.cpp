@@ -110,7 +110,7 @@ std::span<const LiveEvent> SessionRun::observe(const FrameRecord& record,
     first_ = false;
     frame.doppler = record.doppler;
     monitor_.update(frame.time_s, frame.frame, frame.probe_ok, frame.mannequin_from_probe,
-                    frame.needle_ok, frame.mannequin_from_drawn);
+                    frame.needle_ok, frame.mannequin_from_drawn, frame.unseen);
     report_punctures(record.puncture, monitor_);
     monitor_.report_procedure(record.new_steps, record.new_complications);
     const auto events = monitor_.events();

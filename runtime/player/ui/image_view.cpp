@@ -409,9 +409,12 @@ ImagePlace draw_image_view(Ui& ui, const Box& area, const ImageViewInput& input)
     ui.picture(area, "picture");
     // A picture that is not live takes no mouse: the box over it has buttons.
     const Ui::Area mouse = input.stopped.empty() ? ui.area("picture", area) : Ui::Area{};
-    place.hovered = mouse.hovered || mouse.held;
     const ScanFrame& frame = input.frame;
     const bool strip = input.doppler && has_strip(input.doppler->mode);
+    // Across a strip lie seconds: nothing is measured there in millimetres.
+    const bool over_strip = strip && ImGui::GetIO().MousePos.y >= strip_box(area).y * s;
+    place.hovered =
+        (mouse.hovered || mouse.held) && !(over_strip && (input.measuring || input.placing));
     ui.clip(area);
     const ImVec2 corner{area.x * s, area.y * s};
     const float width = area.w * s, height = area.h * s;

@@ -34,9 +34,13 @@ SessionView PlayerWindow::session(const TrackerHealth& tracker) const {
 void PlayerWindow::follow_session() {
     const FrameRecord& record = loaded_.frame().record;
     Training& training = scan_.training;
-    mark_targets_reached(loaded_.exercise(), record, loaded_.target_centres(),
-                         training.targets_reached);
-    if (training.attempt)
+    // The last picture before an attempt shows the targets where they were.
+    const bool current =
+        loaded_.frame().rendered_s > training.attempt_from_s && !scan_.console.controls.frozen;
+    if (current)
+        mark_targets_reached(loaded_.exercise(), record, loaded_.target_centres(),
+                             training.targets_reached);
+    if (training.attempt && current)
         note_steps(loaded_.exercise(), loaded_.engine.anatomy.get(), record,
                    loaded_.target_centres(), training.steps_done);
     if (training.guide) {

@@ -209,7 +209,13 @@ export class ScanPage {
         this.last_s = now_s;
         if (!document.querySelector('dialog[open]')) this.hands.step(seconds);
         if (this.hands.held.size) this.moved = true;
-        if (!this.frozen && !this.held) this.take_pose(now_s);
+        // An attempt goes on behind a frozen picture, where nobody sees it.
+        const unseen = this.frozen && this.values.attempt === 1;
+        if ((!this.frozen || unseen) && !this.held) this.take_pose(now_s);
+        if (unseen && !this.held && Math.abs(now_s - (this.unseen_s ?? 0)) >= 0.98 / kIdleRate) {
+            this.unseen_s = now_s;
+            this.core.calls.frame_unseen(now_s);
+        }
         if (this.playing) this.play(now_s);
         if (this.held) return;
         this.check_signature();

@@ -328,6 +328,9 @@ SONOCASE_EXPORT(adjust_gain) const double* adjust_gain() {
 SONOCASE_EXPORT(frame) int frame(double now_s) {
     return static_cast<int>(page.player->frame(now_s, page.settings));
 }
+SONOCASE_EXPORT(frame_unseen) void frame_unseen(double now_s) {
+    page.player->frame_unseen(now_s, page.settings);
+}
 SONOCASE_EXPORT(frame_again) int frame_again(int back) {
     return static_cast<int>(page.player->frame_again(back, page.settings));
 }

@@ -67,7 +67,8 @@ TEST(SessionFile, SessionsThatNothingCanBeToldOfAreRefused) {
 }
 
 TEST(SessionFile, ComesBackAsItWas) {
-    const Session s = example();
+    Session s = example();
+    s.samples.back().unseen = true;
     const auto bytes = write_sequence(sequence_from_session(s), SequenceForm::mha);
     const auto sequence = read_sequence(bytes, "s");
     ASSERT_TRUE(sequence) << sequence.error().message();
@@ -79,8 +80,8 @@ TEST(SessionFile, ComesBackAsItWas) {
     ASSERT_EQ(back->samples.size(), s.samples.size());
     for (std::size_t i = 0; i < s.samples.size(); ++i) {
         const SessionSample &a = back->samples[i], &b = s.samples[i];
-        EXPECT_EQ(std::tie(a.time_s, a.frame, a.probe_ok, a.needle_ok, a.settings),
-                  std::tie(b.time_s, b.frame, b.probe_ok, b.needle_ok, b.settings));
+        EXPECT_EQ(std::tie(a.time_s, a.frame, a.probe_ok, a.needle_ok, a.settings, a.unseen),
+                  std::tie(b.time_s, b.frame, b.probe_ok, b.needle_ok, b.settings, b.unseen));
         if (b.probe_ok) {
             EXPECT_EQ(a.mannequin_from_probe, b.mannequin_from_probe);
         }

@@ -100,6 +100,27 @@ TEST(ScoreCases, BesideThePlaneTheNeedleIsNotInTheBeam) {
     EXPECT_NEAR(s.value("needle_plane_distance_mean_mm"), 4, 1e-12);
 }
 
+// Behind a frozen picture the needle goes in as it does before a live one, and nothing is seen.
+TEST(ScoreCases, BehindAFrozenPictureNothingIsSeen) {
+    const Vector3 direction = normalized({-1, 0, -1});
+    const Exercise e = exercise_with_target(Point3{40, 0, 0} + 45 * direction);
+    Session s = straight_insertion();
+    for (SessionSample& sample : s.samples) sample.unseen = true;
+    const SessionScore all = score_session(s, e, &kBody, kLabels);
+    EXPECT_EQ(all.value("insertions"), 1);
+    EXPECT_EQ(all.value("targets_hit"), 1);
+    EXPECT_NEAR(all.value("needle_path_length_mm"), 50, 1e-9);
+    EXPECT_EQ(all.value("targets_scanned_percent"), 0);
+    EXPECT_EQ(all.value("needle_in_beam_fraction"), 0);
+    EXPECT_EQ(all.value("tip_in_view_fraction"), 0);
+    EXPECT_EQ(all.value("tip_in_view_at_advance_fraction"), 0);
+    // Seen for the second half of its way alone.
+    for (std::size_t i = 56; i < s.samples.size(); ++i) s.samples[i].unseen = false;
+    const SessionScore half = score_session(s, e, &kBody, kLabels);
+    EXPECT_NEAR(half.value("tip_in_view_at_advance_fraction"), 0.5, 0.02);
+    EXPECT_EQ(half.value("targets_scanned_percent"), 100);
+}
+
 TEST(ScoreCases, SweepingTheShaftSidewaysDamagesTissue) {
     Session s;
     for (int i = 0; i <= 100; ++i) {

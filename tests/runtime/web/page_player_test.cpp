@@ -92,6 +92,35 @@ TEST(PagePlayer, an_attempt_that_ended_is_looked_at_again_from_any_moment) {
     EXPECT_EQ(player->look_at_attempt(0), -1) << "another exercise";
 }
 
+TEST(PagePlayer, an_attempt_goes_on_unseen_behind_a_frozen_picture) {
+    const auto player = open_small();
+    ASSERT_TRUE(player->start_attempt("", "2026-01-31T12:00:00Z", 50));
+    for (int n = 0; n < 5; ++n) player->frame(50 + 0.1 * n, {});
+    const auto shown = copy(player->pixels());
+    const int kept = player->kept();
+    for (int n = 5; n < 15; ++n) {
+        player->hands().slide(0, 1);
+        player->frame_unseen(50 + 0.1 * n, {});
+    }
+    EXPECT_EQ(copy(player->pixels()), shown);
+    EXPECT_EQ(player->kept(), kept);
+    player->frame(51.5, {});
+    const auto finished = player->finish_attempt();
+    ASSERT_TRUE(finished);
+    const auto sequence = read_sequence(finished->recording, "");
+    ASSERT_TRUE(sequence);
+    const auto session = session_from_sequence(*sequence, guess_names(*sequence), "");
+    ASSERT_TRUE(session);
+    ASSERT_EQ(session->samples.size(), 16u);
+    for (std::size_t n = 0; n < 16; ++n)
+        EXPECT_EQ(session->samples[n].unseen, n >= 5 && n < 15) << n;
+    EXPECT_GT(norm(session->samples[14].mannequin_from_probe.translation -
+                   session->samples[4].mannequin_from_probe.translation),
+              5);
+    player->frame_unseen(52, {});  // no attempt runs
+    EXPECT_EQ(copy(player->pixels()).size(), shown.size());
+}
+
 TEST(PagePlayer, a_long_attempt_keeps_fewer_pictures_a_second) {
     const auto player = open_small();
     ASSERT_TRUE(player->choose_exercise(0, 16, 16));

@@ -294,6 +294,29 @@ TEST_F(WindowMended, AScriptStandsAtItsEndInAnAttempt) {
     EXPECT_GT(recorded.back().time_s - recorded.front().time_s, 2.5);
 }
 
+// The needle goes in while the picture is frozen: what it does is recorded, as not seen.
+TEST_F(WindowMended, AnAttemptIsRecordedBehindAFrozenPicture) {
+    const std::string file = folder_ / "frozen.igs.mha";
+    ASSERT_EQ(run("--tracker mouse --record " + file,
+                  "wait 30\nkey n\nwait 10\nkey space\nwait 10\nhold w 90\nwait 10\n"
+                  "key space\nwait 20\nquit\n")
+                  .status,
+              0);
+    const std::vector<SessionSample> recorded = samples(file);
+    const auto unseen = [](const SessionSample& sample) { return sample.unseen; };
+    const auto first = std::find_if(recorded.begin(), recorded.end(), unseen),
+               end = std::find_if_not(first, recorded.end(), unseen);
+    ASSERT_TRUE(first != recorded.begin() && first != recorded.end() && end != recorded.end());
+    EXPECT_TRUE(std::none_of(end, recorded.end(), unseen));
+    const auto way_mm = [](const SessionSample& a, const SessionSample& b) {
+        return norm(a.mannequin_from_needle.translation - b.mannequin_from_needle.translation);
+    };
+    EXPECT_GT(way_mm(*first, *std::prev(end)), 10);
+    EXPECT_LT(way_mm(*std::prev(end), *end), 1);
+    for (auto sample = std::next(first); sample != end; ++sample)
+        EXPECT_LT(sample->time_s - std::prev(sample)->time_s, 1) << sample->time_s;
+}
+
 // A long title is shown on two lines where it is read, and with an ellipsis elsewhere; no letter is
 // cut in two.
 TEST_F(WindowMended, ALongTitleEndsInAnEllipsisAndNothingElseMoves) {
