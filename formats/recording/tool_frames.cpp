@@ -76,7 +76,9 @@ int rank_as_tool(std::string_view transform, ToolRole role) {
     const bool is_needle = any(kNeedleWords, holds);
     int rank = 0;
     if (needle) {
-        rank = any(kNeedleWords, begins) ? 3 : is_needle ? 2 : 0;
+        if (is_needle)
+            rank = 1 + (any(kNeedleWords, begins) ? 1 : 0) + (holds("tip") ? 2 : 0) +
+                   (holds("needle") ? 4 : 0);
     } else if (!is_needle) {
         const bool image = begins("image") || tool == "us" || holds("image");
         rank = any(kProbeWords, begins) ? 4 : any(kProbeWords, holds) ? 3 : image ? 1 : 0;

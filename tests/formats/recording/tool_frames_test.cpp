@@ -36,6 +36,17 @@ TEST(ToolFrames, NamesSayWhichTransformIsATool) {
     EXPECT_EQ(found({"probe_1ToTracker", "NEEDLEToTracker"}, ToolRole::probe), "probe_1ToTracker");
     EXPECT_EQ(found({"UsProbeToReference", "StylusTipToReference"}, ToolRole::probe),
               "UsProbeToReference");
+    // The sensor is not the tip, in whatever order they stand, and a stylus is no needle.
+    for (const std::string tip : {"NeedleTip", "StylusTip", "needle_tip"}) {
+        const std::string sensor = tip.starts_with("S") ? "Stylus" : "Needle";
+        const std::string best = tip + "ToReference";
+        for (const std::string to : {"ToReference", "ToTracker"}) {
+            EXPECT_EQ(found({sensor + to, best}, ToolRole::needle), best);
+            EXPECT_EQ(found({best, sensor + to}, ToolRole::needle), best);
+        }
+    }
+    EXPECT_EQ(found({"StylusTipToTracker", "NeedleToTracker"}, ToolRole::needle),
+              "NeedleToTracker");
     EXPECT_EQ(split_transform_name("ToolToTracker").from, "Tool");
     EXPECT_EQ(split_transform_name("StylusToRAS").to, "RAS");
     EXPECT_EQ(split_transform_name("Stylus").to, "");
