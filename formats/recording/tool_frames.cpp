@@ -168,6 +168,16 @@ void add_inverses(Sequence& sequence) {
     }
 }
 
+int find_reference(const Sequence& sequence, std::string_view tool) {
+    const std::string_view tracker = split_transform_name(tool).to;
+    if (lower_case(tracker).find("tracker") == std::string::npos) return -1;
+    for (std::size_t i = 0; i < sequence.transforms.size(); ++i) {
+        const TransformName name = split_transform_name(sequence.transforms[i]);
+        if (name.to == tracker && lower_case(name.from) == "reference") return static_cast<int>(i);
+    }
+    return -1;
+}
+
 bool in_two_frames(const std::string& probe, const std::string& needle) {
     const TransformName a = split_transform_name(probe), b = split_transform_name(needle);
     return !a.to.empty() && !b.to.empty() && a.to != b.to;

@@ -40,6 +40,10 @@ int compose_transform(Sequence& sequence,
                       std::string_view to,
                       Message* said = nullptr);
 
+// ReferenceToTracker, where `tool` ends in this tracker: of a sensor that is fixed to the mannequin
+// or the patient. -1: none, or `tool` ends in no tracker.
+int find_reference(const Sequence& sequence, std::string_view tool);
+
 // Adds the poses of tools that a recording has only the other way round (TrackerToProbe), with a
 // note. What ends in a tool and begins in no tracker, reference or patient is a calibration.
 void add_inverses(Sequence& sequence);

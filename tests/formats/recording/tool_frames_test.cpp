@@ -79,7 +79,7 @@ Moving moving_reference() {
 TEST(ToolFrames, ToolsThatEndInTwoFramesAreBroughtToOne) {
     const Moving given = moving_reference();
     const SessionNames names = guess_names(given.sequence);
-    EXPECT_EQ(names.probe, "ProbeToTracker");
+    EXPECT_EQ(names.probe, "ProbeToReference");
     const auto session = session_from_sequence(given.sequence, names, "s");
     ASSERT_TRUE(session) << session.error().message();
     ASSERT_EQ(session->notes.size(), 1u);
@@ -98,6 +98,49 @@ TEST(ToolFrames, ToolsThatEndInTwoFramesAreBroughtToOne) {
     const auto refused = session_from_sequence(apart, guess_names(apart), "s");
     ASSERT_FALSE(refused);
     EXPECT_NE(refused.error().message().find("ReferenceToTracker"), std::string::npos);
+}
+
+// Raw recordings of PLUS: the tracker's frame is not the mannequin's where that moves.
+TEST(ToolFrames, ToolsOfATrackerAreTakenRelativeToItsReference) {
+    Moving given = moving_reference();
+    given.sequence.transforms[1] = "NeedleToTracker";
+    for (std::size_t i = 0; i < given.needle.size(); ++i) {
+        auto& poses = given.sequence.frames[i].poses;
+        const Rigid reference = *rigid_from_matrix(poses[2].to_from);
+        poses[1].to_from = matrix_from_rigid(reference * given.needle[i]);
+    }
+    SessionNames named;
+    named.probe = "ProbeToReference";
+    named.needle = "NeedleToReference";
+    for (const SessionNames& names : {guess_names(given.sequence), named}) {
+        EXPECT_EQ(names.probe, "ProbeToReference");
+        const auto session = session_from_sequence(given.sequence, names, "s");
+        ASSERT_TRUE(session) << session.error().message();
+        ASSERT_EQ(session->notes.size(), 2u);
+        EXPECT_EQ(session->notes[1],
+                  "NeedleToReference is composed of NeedleToTracker, ReferenceToTracker.");
+        for (std::size_t i = 0; i < given.probe.size(); ++i) {
+            const SessionSample& s = session->samples[i];
+            ASSERT_EQ(s.probe_ok, i != 7);
+            ASSERT_EQ(s.needle_ok, i != 7);
+            if (i == 7) continue;
+            EXPECT_LT(norm(s.mannequin_from_probe.translation - given.probe[i].translation), 1e-9);
+            EXPECT_LT(norm(s.mannequin_from_needle.translation - given.needle[i].translation),
+                      1e-9);
+        }
+    }
+    // Who names the tracker's frame gets it; other frames are the tools' own.
+    named.probe = "ProbeToTracker";
+    named.needle = "NeedleToTracker";
+    const auto raw = session_from_sequence(given.sequence, named, "s");
+    ASSERT_TRUE(raw) << raw.error().message();
+    EXPECT_TRUE(raw->notes.empty());
+    for (const std::string to : {"Mannequin", "RAS"}) {
+        Sequence other = given.sequence;
+        other.transforms = {"ProbeTo" + to, "NeedleTo" + to, "ReferenceTo" + to};
+        EXPECT_EQ(guess_names(other).probe, "ProbeTo" + to);
+        EXPECT_EQ(guess_names(other).needle, "NeedleTo" + to);
+    }
 }
 
 // A recording that has its tools the other way round only; calibrations are none of them.
