@@ -89,15 +89,30 @@ struct NamedMatrix {
     double rms_mm = -1;
 };
 
-Result<std::vector<NamedMatrix>> transforms_of_xml(std::string_view text,
-                                                   const std::string& where) {
+// The elements of XML: without comments and character data, in which elements are text.
+std::string without_comments(std::string_view xml) {
+    std::string out;
+    while (true) {
+        const std::size_t comment = xml.find("<!--"), data = xml.find("<![CDATA[");
+        const std::size_t from = std::min(comment, data);
+        out += xml.substr(0, from);
+        if (from == std::string_view::npos) return out;
+        const std::string_view end = comment < data ? "-->" : "]]>";
+        const std::size_t to = xml.find(end, from + 4);
+        if (to == std::string_view::npos) return out;
+        xml.remove_prefix(to + end.size());
+    }
+}
+
+Result<std::vector<NamedMatrix>> transforms_of_xml(std::string_view xml, const std::string& where) {
+    const std::string text = without_comments(xml);
     std::vector<NamedMatrix> out;
     for (std::size_t at = text.find("<Transform"); at != std::string_view::npos;
          at = text.find("<Transform", at + 1)) {
         const std::size_t end = text.find('>', at);
         if (end == std::string_view::npos)
             return Error{"ends inside an element", where, "copy the file again"};
-        const std::string_view element = text.substr(at, end - at);
+        const std::string_view element = std::string_view(text).substr(at, end - at);
         NamedMatrix one{
             attribute(element, "From"), attribute(element, "To"), {}, attribute(element, "Date")};
         const auto numbers = numbers_in(attribute(element, "Matrix"));

@@ -120,6 +120,33 @@ TEST(CalibrationFile, PlusGivesEachToolAndTheFaceOfTheProbe) {
               std::string::npos);
 }
 
+std::string transform_element(const std::string& from, const std::string& to, int x) {
+    return "<Transform From='" + from + "' To='" + to + "' Matrix='1 0 0 " + std::to_string(x) +
+           " 0 1 0 0 0 0 1 0 0 0 0 1'/>\n";
+}
+
+// A configuration keeps older calibrations in comments.
+TEST(CalibrationFile, ElementsInCommentsOfXmlAreNotRead) {
+    const auto read = [](const std::string& elements) {
+        const std::string text = "<PlusConfiguration>" + elements + "</PlusConfiguration>";
+        EXPECT_TRUE(looks_like_foreign_calibration(text));
+        return parse_foreign_calibrations(text, "PlusDeviceSet.xml");
+    };
+    const std::string old = transform_element("NeedleTip", "Needle", 1),
+                      needle = transform_element("NeedleTip", "Needle", 7);
+    for (const std::string& elements :
+         {"<!-- of May: " + old + "-->" + needle, "<![CDATA[" + old + "]]>" + needle,
+          "<!-- a > b --><!--" + old + old + "-->" + needle + "<!--" + old}) {
+        const auto found = read(elements);
+        ASSERT_TRUE(found) << found.error().message();
+        EXPECT_EQ(found->front().sensor_from_tool.translation.x, 7) << elements;
+        EXPECT_TRUE(found->front().warnings.empty());
+    }
+    const auto none = read("<!--" + old + "-->");
+    ASSERT_FALSE(none);
+    EXPECT_NE(none.error().message().find("found none"), std::string::npos);
+}
+
 TEST(CalibrationFile, AMirrorIsNoRotationAndAnUnknownKindIsNamed) {
     Calibration c;
     c.kind = "probe";
