@@ -179,10 +179,27 @@ Result<std::vector<Calibration>> parse_plus(std::string_view text, const std::st
         out.push_back(std::move(one));
         return Done{};
     };
+    // A stylus is another tool: it is taken for the needle only where there is none.
+    const auto is_tip = [](const NamedMatrix& one, std::string_view tool) {
+        return holds(one.from, tool) && holds(one.from, "tip");
+    };
+    for (const std::string_view tool : {"needle", "stylus"}) {
+        const auto tip = std::find_if(list.begin(), list.end(),
+                                      [&](const NamedMatrix& one) { return is_tip(one, tool); });
+        if (tip == list.end()) continue;
+        SONOCASE_TRY_DONE(add("needle", tip->to_from, &*tip));
+        std::string others;
+        for (const NamedMatrix& one : list) {
+            if (&one != &*tip && (is_tip(one, "needle") || is_tip(one, "stylus")))
+                others += (others.empty() ? "" : ", ") + one.from + " to " + one.to;
+        }
+        if (!others.empty())
+            out.back().warnings.push_back(tip->from + " to " + tip->to +
+                                          " is the needle; not taken: " + others + ".");
+        break;
+    }
     for (const NamedMatrix& one : list) {
         names += (names.empty() ? "" : ", ") + one.from + " to " + one.to;
-        const bool needle = holds(one.from, "needle") || holds(one.from, "stylus");
-        if (needle && holds(one.from, "tip")) SONOCASE_TRY_DONE(add("needle", one.to_from, &one));
         if (one.from == "Mannequin") SONOCASE_TRY_DONE(add("mannequin", one.to_from, &one));
         if (one.from == "ProbeFace") SONOCASE_TRY_DONE(add("probe", one.to_from, &one));
     }

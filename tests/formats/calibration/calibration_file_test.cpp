@@ -147,6 +147,24 @@ TEST(CalibrationFile, ElementsInCommentsOfXmlAreNotRead) {
     EXPECT_NE(none.error().message().find("found none"), std::string::npos);
 }
 
+TEST(CalibrationFile, ANeedleGoesBeforeAStylusAndThisIsSaid) {
+    const std::string needle = transform_element("NeedleTip", "Needle", 7),
+                      stylus = transform_element("StylusTip", "Stylus", 8);
+    for (const std::string& elements : {needle + stylus, stylus + needle}) {
+        const auto found = parse_foreign_calibrations("<a>" + elements + "</a>", "set.xml");
+        ASSERT_TRUE(found) << found.error().message();
+        ASSERT_EQ(found->size(), 1u);
+        EXPECT_EQ(found->front().sensor_from_tool.translation.x, 7);
+        ASSERT_EQ(found->front().warnings.size(), 1u);
+        EXPECT_EQ(found->front().warnings[0],
+                  "NeedleTip to Needle is the needle; not taken: StylusTip to Stylus.");
+    }
+    const auto alone = parse_foreign_calibrations("<a>" + stylus + "</a>", "set.xml");
+    ASSERT_TRUE(alone) << alone.error().message();
+    EXPECT_EQ(alone->front().sensor_from_tool.translation.x, 8);
+    EXPECT_TRUE(alone->front().warnings.empty());
+}
+
 TEST(CalibrationFile, AMirrorIsNoRotationAndAnUnknownKindIsNamed) {
     Calibration c;
     c.kind = "probe";
