@@ -608,7 +608,8 @@ std::string_view after(std::string_view line, std::string_view key, char between
 }
 
 // OptiTrack Motive's export: lines "Format Version", Type, Name, ID, which quantity, and
-// "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,..."; quaternions are x, y, z, w.
+// "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,..."; quaternions are x, y, z, w. Older formats do not label
+// their lines: the one below the types holds the names.
 Result<Layout> motive_layout(std::string_view& text, int& number, const std::string& where) {
     std::string_view line = next_line(text);
     const std::string at = where + ":" + std::to_string(++number);
@@ -632,13 +633,14 @@ Result<Layout> motive_layout(std::string_view& text, int& number, const std::str
     while (!text.empty()) {
         line = next_line(text);
         ++number;
+        if (line.empty()) continue;
         split(line, between, cells);
         const auto holds = [&](std::string_view word) {
             return std::find(cells.begin(), cells.end(), word) != cells.end();
         };
         if (cells.front() == "Frame") break;
-        if (holds("Type") || holds("Rigid Body")) types = cells;
-        if (holds("Name")) names = cells;
+        if (holds("Name") || (!types.empty() && names.empty())) names = cells;
+        if (types.empty() && (holds("Type") || holds("Rigid Body"))) types = cells;
         if (holds("Rotation") || holds("Position")) quantities = cells;
         if (number > 50) return Error{"has no line that begins with Frame", at, "export it again"};
     }

@@ -289,14 +289,18 @@ TEST(PoseTables, OfSeveralToolsGiveEachItsOwn) {
         motive += n + "," + t + "," + cells(probe[i], 1e-3, true, ',') + ",0.001,5," +
                   (lost ? ",,,,,," : cells(needle[i], 1e-3, true, ',')) + "\n";
     }
+    std::string unlabelled = motive;  // as older formats are
+    for (const std::string label : {",Type,", ",Name,"})
+        unlabelled.replace(unlabelled.find(label), label.size(), ",,");
     const testing::TemporaryFolder folder;
     const std::pair<const char*, std::pair<std::string, std::string>> forms[] = {
         {"by_row.csv", {"ProbeToTracker", "NeedleToTracker"}},
         {"by_prefix.csv", {"probeToTracker", "needleToTracker"}},
         {"ndi.csv", {"port_1ToTracker", "port_2ToTracker"}},
-        {"motive.csv", {"ProbeToTracker", "NeedleToTracker"}}};
-    const std::string* texts[] = {&by_row, &by_prefix, &ndi, &motive};
-    for (std::size_t form = 0; form < 4; ++form) {
+        {"motive.csv", {"ProbeToTracker", "NeedleToTracker"}},
+        {"unlabelled.csv", {"ProbeToTracker", "NeedleToTracker"}}};
+    const std::string* texts[] = {&by_row, &by_prefix, &ndi, &motive, &unlabelled};
+    for (std::size_t form = 0; form < 5; ++form) {
         const auto& [file, names] = forms[form];
         const auto read = load_recording_file(folder.write(file, *texts[form]));
         ASSERT_TRUE(read) << read.error().message();
