@@ -432,6 +432,48 @@ TEST(PoseTables, OtherNamesAreUnderstood) {
     EXPECT_NE(date.error().message().find("numbers of seconds"), std::string::npos);
 }
 
+TEST(PoseTables, ARowOfUnitsBelowTheNamesIsTaken) {
+    const auto read = [](const std::string& units) {
+        return parse_pose_table(
+            "time,tx,ty,tz,qw,qx,qy,qz\n" + units + "\n0,1,2,3,1,0,0,0\n500,2,2,3,1,0,0,0\n", "p");
+    };
+    for (const auto& [units, scale, last_s] :
+         {std::tuple{"s,mm,mm,mm,,,,", 1.0, 500.0},
+          {"ms,m,m,m,-,-,-,-", 1000.0, 0.5},
+          {"[s],[cm],[cm],[cm],quaternion,quaternion,quaternion,quaternion", 10.0, 500.0}}) {
+        const auto table = read(units);
+        ASSERT_TRUE(table) << table.error().message();
+        const std::vector<Pose>& poses = table->front().poses;
+        ASSERT_EQ(poses.size(), 2u) << units;
+        EXPECT_EQ(poses[0].tracker_from_tool.translation, scale * (Vector3{1, 2, 3})) << units;
+        EXPECT_NEAR(poses[1].timestamp_s, last_s, 1e-9) << units;
+    }
+    const auto inches = read("s,in,in,in,,,,");
+    ASSERT_FALSE(inches);
+    EXPECT_EQ(inches.error().message(), "p:2: places are in 'in'; expected mm, cm or m");
+    EXPECT_FALSE(read("s,a,b,c,,,,"));
+    EXPECT_FALSE(read("a,b,c,d,,,,"));
+    for (const char* names :
+         {"t,x (in),y (in),z (in)", "t,probe_tx_inch,probe_ty_inch,probe_tz_inch"}) {
+        const auto named =
+            parse_pose_table(std::string(names) + ",qw,qx,qy,qz\n0,1,2,3,1,0,0,0\n", "p");
+        ASSERT_FALSE(named);
+        EXPECT_NE(named.error().message().find("unit of"), std::string::npos)
+            << named.error().message();
+    }
+}
+
+// What NDI's programs write for what was not measured.
+TEST(PoseTables, NdisMissingValueIsALostTool) {
+    std::string text = "Frame,Q0,Qx,Qy,Qz,Tx,Ty,Tz\n0,1,0,0,0,1,2,3\n1";
+    for (int i = 0; i < 7; ++i) text += ",-3.697314e28";
+    const auto table = parse_pose_table(text + "\n", "p");
+    ASSERT_TRUE(table) << table.error().message();
+    ASSERT_EQ(table->front().poses.size(), 2u);
+    EXPECT_TRUE(table->front().poses[0].ok);
+    EXPECT_FALSE(table->front().poses[1].ok);
+}
+
 TEST(PoseTables, OneToolTwiceInARowIsRefused) {
     const auto twice = parse_pose_table(
         "timestamp,probe_tx,probe_ty,probe_tz,probe_qw,probe_qx,probe_qy,probe_qz,"
