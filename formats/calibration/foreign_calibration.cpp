@@ -64,6 +64,17 @@ std::optional<std::vector<double>> numbers_in(std::string_view text) {
     }
 }
 
+// The same for the cells of a matrix. Commas are decimal where semicolons stand between cells, of
+// which a matrix has more than rows, and no point does.
+std::optional<std::vector<double>> matrix_cells(std::string_view text) {
+    const bool decimal =
+        std::count(text.begin(), text.end(), ';') > 8 && text.find('.') == std::string_view::npos;
+    if (!decimal) return numbers_in(text);
+    std::string with_points(text);
+    std::replace(with_points.begin(), with_points.end(), ',', '.');
+    return numbers_in(with_points);
+}
+
 bool holds(std::string_view text, std::string_view word) {
     const auto same = [](char a, char b) { return lower_case(a) == b; };
     return std::search(text.begin(), text.end(), word.begin(), word.end(), same) != text.end();
@@ -273,6 +284,11 @@ bool is_itk(std::string_view text) {
     return text.starts_with("#Insight Transform File");
 }
 
+// ITK's transforms in HDF5 or in MATLAB's form.
+bool is_binary(std::string_view text) {
+    return text.substr(0, 1024).find('\0') != std::string_view::npos;
+}
+
 bool is_xml(std::string_view text) {
     return trimmed(text.substr(0, 512)).starts_with("<") &&
            text.find("<Transform") != std::string_view::npos;
@@ -290,19 +306,22 @@ std::string matrix_text(const Matrix4& m, const char* row_end) {
 }  // namespace
 
 bool looks_like_foreign_calibration(std::string_view text) {
-    if (is_itk(text) || is_xml(text)) return true;
-    const auto numbers = numbers_in(text);
+    if (is_itk(text) || is_xml(text) || is_binary(text)) return true;
+    const auto numbers = matrix_cells(text);
     return numbers && (numbers->size() == 16 || numbers->size() == 12);
 }
 
 Result<std::vector<Calibration>> parse_foreign_calibrations(std::string_view text,
                                                             const std::string& where) {
+    if (is_binary(text))
+        return Error{"is a binary file", where,
+                     "save the transform as text, from 3D Slicer as .tfm or .txt"};
     if (is_xml(text)) return parse_plus(text, where);
     Matrix4 matrix{};
     if (is_itk(text)) {
         SONOCASE_TRY(matrix, parse_itk(text, where));
     } else {
-        const auto numbers = numbers_in(text);
+        const auto numbers = matrix_cells(text);
         if (!numbers || (numbers->size() != 16 && numbers->size() != 12))
             return Error{"is no matrix", where, "expected 4 rows of 4 numbers"};
         std::copy(numbers->begin(), numbers->end(), matrix.begin());

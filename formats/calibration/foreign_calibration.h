@@ -17,7 +17,9 @@
 
 namespace sonocase {
 
-// True for the three forms, by what a file holds.
+// True for the three forms, by what a file holds, and for binary files, such as transforms in HDF5,
+// which are then refused with the cure. A matrix may have semicolons between cells and decimal
+// commas.
 bool looks_like_foreign_calibration(std::string_view text);
 
 // Of XML every tool whose transform it has, outside comments: NeedleTip to anything is the needle,

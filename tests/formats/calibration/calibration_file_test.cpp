@@ -165,6 +165,25 @@ TEST(CalibrationFile, ANeedleGoesBeforeAStylusAndThisIsSaid) {
     EXPECT_TRUE(alone->front().warnings.empty());
 }
 
+TEST(CalibrationFile, DecimalCommasAreReadAndBinaryFilesNamed) {
+    for (const char* text : {"1;0;0;3,5\n0;1;0;-4,25\n0;0;1;150,125\n0;0;0;1\n",
+                             "1,0;0,0;0,0;3,5;0,0;1,0;0,0;-4,25;0,0;0,0;1,0;150,125",
+                             "[1, 0, 0, 3.5; 0, 1, 0, -4.25; 0, 0, 1, 150.125; 0, 0, 0, 1]"}) {
+        ASSERT_TRUE(looks_like_foreign_calibration(text)) << text;
+        const auto read = parse_foreign_calibrations(text, "needle.txt");
+        ASSERT_TRUE(read) << text << read.error().message();
+        EXPECT_EQ(read->front().sensor_from_tool.translation, (Vector3{3.5, -4.25, 150.125}));
+    }
+    // Transforms of ITK in HDF5 and in MATLAB's form.
+    for (const std::string& bytes : {std::string("\x89HDF\r\n\x1a\n\0\0\0", 11),
+                                     std::string("\0\0\0\0\x0c\0\0\0\x01\0\0\0", 12)}) {
+        ASSERT_TRUE(looks_like_foreign_calibration(bytes));
+        const auto refused = parse_foreign_calibrations(bytes, "needle.h5");
+        ASSERT_FALSE(refused);
+        EXPECT_NE(refused.error().message().find(".tfm or .txt"), std::string::npos);
+    }
+}
+
 TEST(CalibrationFile, AMirrorIsNoRotationAndAnUnknownKindIsNamed) {
     Calibration c;
     c.kind = "probe";
