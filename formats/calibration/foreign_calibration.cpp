@@ -64,6 +64,17 @@ std::optional<std::vector<double>> numbers_in(std::string_view text) {
     }
 }
 
+// The same for the cells of a matrix. Commas are decimal where semicolons stand between cells, of
+// which a matrix has more than rows, and no point does.
+std::optional<std::vector<double>> matrix_cells(std::string_view text) {
+    const bool decimal =
+        std::count(text.begin(), text.end(), ';') > 8 && text.find('.') == std::string_view::npos;
+    if (!decimal) return numbers_in(text);
+    std::string with_points(text);
+    std::replace(with_points.begin(), with_points.end(), ',', '.');
+    return numbers_in(with_points);
+}
+
 bool holds(std::string_view text, std::string_view word) {
     const auto same = [](char a, char b) { return lower_case(a) == b; };
     return std::search(text.begin(), text.end(), word.begin(), word.end(), same) != text.end();
@@ -89,15 +100,30 @@ struct NamedMatrix {
     double rms_mm = -1;
 };
 
-Result<std::vector<NamedMatrix>> transforms_of_xml(std::string_view text,
-                                                   const std::string& where) {
+// The elements of XML: without comments and character data, in which elements are text.
+std::string without_comments(std::string_view xml) {
+    std::string out;
+    while (true) {
+        const std::size_t comment = xml.find("<!--"), data = xml.find("<![CDATA[");
+        const std::size_t from = std::min(comment, data);
+        out += xml.substr(0, from);
+        if (from == std::string_view::npos) return out;
+        const std::string_view end = comment < data ? "-->" : "]]>";
+        const std::size_t to = xml.find(end, from + 4);
+        if (to == std::string_view::npos) return out;
+        xml.remove_prefix(to + end.size());
+    }
+}
+
+Result<std::vector<NamedMatrix>> transforms_of_xml(std::string_view xml, const std::string& where) {
+    const std::string text = without_comments(xml);
     std::vector<NamedMatrix> out;
     for (std::size_t at = text.find("<Transform"); at != std::string_view::npos;
          at = text.find("<Transform", at + 1)) {
         const std::size_t end = text.find('>', at);
         if (end == std::string_view::npos)
             return Error{"ends inside an element", where, "copy the file again"};
-        const std::string_view element = text.substr(at, end - at);
+        const std::string_view element = std::string_view(text).substr(at, end - at);
         NamedMatrix one{
             attribute(element, "From"), attribute(element, "To"), {}, attribute(element, "Date")};
         const auto numbers = numbers_in(attribute(element, "Matrix"));
@@ -164,10 +190,27 @@ Result<std::vector<Calibration>> parse_plus(std::string_view text, const std::st
         out.push_back(std::move(one));
         return Done{};
     };
+    // A stylus is another tool: it is taken for the needle only where there is none.
+    const auto is_tip = [](const NamedMatrix& one, std::string_view tool) {
+        return holds(one.from, tool) && holds(one.from, "tip");
+    };
+    for (const std::string_view tool : {"needle", "stylus"}) {
+        const auto tip = std::find_if(list.begin(), list.end(),
+                                      [&](const NamedMatrix& one) { return is_tip(one, tool); });
+        if (tip == list.end()) continue;
+        SONOCASE_TRY_DONE(add("needle", tip->to_from, &*tip));
+        std::string others;
+        for (const NamedMatrix& one : list) {
+            if (&one != &*tip && (is_tip(one, "needle") || is_tip(one, "stylus")))
+                others += (others.empty() ? "" : ", ") + one.from + " to " + one.to;
+        }
+        if (!others.empty())
+            out.back().warnings.push_back(tip->from + " to " + tip->to +
+                                          " is the needle; not taken: " + others + ".");
+        break;
+    }
     for (const NamedMatrix& one : list) {
         names += (names.empty() ? "" : ", ") + one.from + " to " + one.to;
-        const bool needle = holds(one.from, "needle") || holds(one.from, "stylus");
-        if (needle && holds(one.from, "tip")) SONOCASE_TRY_DONE(add("needle", one.to_from, &one));
         if (one.from == "Mannequin") SONOCASE_TRY_DONE(add("mannequin", one.to_from, &one));
         if (one.from == "ProbeFace") SONOCASE_TRY_DONE(add("probe", one.to_from, &one));
     }
@@ -241,6 +284,11 @@ bool is_itk(std::string_view text) {
     return text.starts_with("#Insight Transform File");
 }
 
+// ITK's transforms in HDF5 or in MATLAB's form.
+bool is_binary(std::string_view text) {
+    return text.substr(0, 1024).find('\0') != std::string_view::npos;
+}
+
 bool is_xml(std::string_view text) {
     return trimmed(text.substr(0, 512)).starts_with("<") &&
            text.find("<Transform") != std::string_view::npos;
@@ -258,19 +306,22 @@ std::string matrix_text(const Matrix4& m, const char* row_end) {
 }  // namespace
 
 bool looks_like_foreign_calibration(std::string_view text) {
-    if (is_itk(text) || is_xml(text)) return true;
-    const auto numbers = numbers_in(text);
+    if (is_itk(text) || is_xml(text) || is_binary(text)) return true;
+    const auto numbers = matrix_cells(text);
     return numbers && (numbers->size() == 16 || numbers->size() == 12);
 }
 
 Result<std::vector<Calibration>> parse_foreign_calibrations(std::string_view text,
                                                             const std::string& where) {
+    if (is_binary(text))
+        return Error{"is a binary file", where,
+                     "save the transform as text, from 3D Slicer as .tfm or .txt"};
     if (is_xml(text)) return parse_plus(text, where);
     Matrix4 matrix{};
     if (is_itk(text)) {
         SONOCASE_TRY(matrix, parse_itk(text, where));
     } else {
-        const auto numbers = numbers_in(text);
+        const auto numbers = matrix_cells(text);
         if (!numbers || (numbers->size() != 16 && numbers->size() != 12))
             return Error{"is no matrix", where, "expected 4 rows of 4 numbers"};
         std::copy(numbers->begin(), numbers->end(), matrix.begin());

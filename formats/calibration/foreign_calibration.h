@@ -17,10 +17,13 @@
 
 namespace sonocase {
 
-// True for the three forms, by what a file holds.
+// True for the three forms, by what a file holds, and for binary files, such as transforms in HDF5,
+// which are then refused with the cure. A matrix may have semicolons between cells and decimal
+// commas.
 bool looks_like_foreign_calibration(std::string_view text);
 
-// Of XML every tool whose transform it has: NeedleTip or StylusTip to anything is the needle,
+// Of XML every tool whose transform it has, outside comments: NeedleTip to anything is the needle,
+// or StylusTip where there is none, and what is not taken is a warning of the calibration;
 // Mannequin to anything the mannequin, ProbeFace to Probe the probe's face (x along it, z into the
 // body); TransducerOrigin to Probe as well (PLUS: x along the face, y into the body), composed
 // where the file has its parts. Of the others one, whose kind the file's name says: needle, stylus,

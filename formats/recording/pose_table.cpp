@@ -15,6 +15,18 @@
 #include "formats/text/number_text.h"
 
 namespace sonocase {
+
+bool is_none(std::string_view cell) {
+    static constexpr std::string_view kNone[] = {
+        "",        "nan",    "-nan",    "nan(ind)", "-nan(ind)", "1.#qna",
+        "-1.#qna", "1.#ind", "-1.#ind", "1.#nan",   "#n/a",      "n/a",
+        "na",      "null",   "none",    "-",        "--",        "missing"};
+    if (cell.size() > 10) return false;
+    std::string word = lower_case(cell);
+    if (word.starts_with("1.#") || word.starts_with("-1.#")) word.resize(word.find('#') + 4);
+    return std::find(std::begin(kNone), std::end(kNone), word) != std::end(kNone);
+}
+
 namespace {
 
 constexpr std::array<const char*, 3> kPlaces{"tx", "ty", "tz"};
@@ -22,6 +34,7 @@ constexpr std::array<const char*, 4> kQuaternion{"qw", "qx", "qy", "qz"};
 constexpr std::array<const char*, 9> kMatrix{"r00", "r01", "r02", "r10", "r11",
                                              "r12", "r20", "r21", "r22"};
 constexpr std::size_t kMaxTools = 64;
+constexpr double kNdiMissing = -3e28;  // NDI writes -3.697314e28 for what it has not measured
 
 // The same columns by other names, as other programs write them.
 constexpr std::pair<std::string_view, std::string_view> kOtherNames[] = {
@@ -111,18 +124,6 @@ char separator_of(std::string_view line) {
     return ' ';
 }
 
-// What stands where there is no number.
-bool is_none(std::string_view cell) {
-    static constexpr std::string_view kNone[] = {
-        "",        "nan",    "-nan",    "nan(ind)", "-nan(ind)", "1.#qna",
-        "-1.#qna", "1.#ind", "-1.#ind", "1.#nan",   "#n/a",      "n/a",
-        "na",      "null",   "none",    "-",        "--",        "missing"};
-    if (cell.size() > 10) return false;
-    std::string word = lower_case(cell);
-    if (word.starts_with("1.#") || word.starts_with("-1.#")) word.resize(word.find('#') + 4);
-    return std::find(std::begin(kNone), std::end(kNone), word) != std::end(kNone);
-}
-
 // What a cell of a column of states says.
 enum class State { counts, lost, unknown };
 State state_of(std::string_view cell) {
@@ -204,6 +205,10 @@ class LayoutReader {
 
     Result<Layout> read() {
         if (columns_.size() == 1 && line_.find(' ') == std::string_view::npos) return missing("tx");
+        if (!other_unit_.empty())
+            return Error{
+                "places are in the unit of '" + std::string(other_unit_.substr(0, 40)) + "'", at_,
+                "expected mm, cm or m: convert them and name their columns so"};
         layout_.tool_column = first("tool");
         const std::vector<int> turns = all(has_all("", kQuaternion) ? "qw" : "r00");
         const bool plain = has_all("", kPlaces) && !turns.empty();
@@ -227,6 +232,11 @@ class LayoutReader {
         int index = 0;
         double unit_mm = 1;
     };
+    static bool is_place(std::string_view name) {
+        const std::string_view before = name.substr(0, name.size() - 1);
+        const bool axis = !name.empty() && name.back() >= 'x' && name.back() <= 'z';
+        return axis && (before.empty() || before.ends_with("_") || before.ends_with("t"));
+    }
 
     void add(std::string_view cell, int index) {
         std::string name;
@@ -249,6 +259,11 @@ class LayoutReader {
                    m = !cm &&
                        (name.ends_with("x_m") || name.ends_with("y_m") || name.ends_with("z_m")) &&
                        cut("_m");
+        for (const std::string_view other : {"_in", "_inch", "_inches", "_ft", "_dm", "_um"}) {
+            if (!name.ends_with(other) || !is_place(name.substr(0, name.size() - other.size())))
+                continue;
+            if (other_unit_.empty()) other_unit_ = cell;
+        }
         name = of_matrix(name);
         for (const auto& [given, meant] : kOtherNames) {
             if (name != given) continue;
@@ -445,7 +460,8 @@ class LayoutReader {
     std::string_view line_;
     std::string at_;
     std::vector<Named> columns_;
-    std::string twice_;  // a tool whose columns stand in the line more than once
+    std::string twice_;            // a tool whose columns stand in the line more than once
+    std::string_view other_unit_;  // the first column of places in a unit that is not read
     Layout layout_;
 };
 
@@ -507,6 +523,7 @@ class RowReader {
                 if (cell(column).empty()) ++empty;
                 values[i] = std::numeric_limits<double>::quiet_NaN();
             }
+            if (values[i] < kNdiMissing) values[i] = std::numeric_limits<double>::quiet_NaN();
             if (std::isnan(values[i])) ++none;
         }
         // A row without a pose may have no numbers for it; half a pose is a fault of the table.
@@ -568,6 +585,57 @@ class RowReader {
     int last_ = -1, number_ = 0;
 };
 
+// A row of units below the names ("s,mm,mm,mm,..."): true if this line is one, and the units are
+// taken. It holds words and no numbers, and one of them is the unit of a time or place.
+Result<bool> take_units(std::string_view line, const std::string& at, Layout& layout) {
+    constexpr std::pair<std::string_view, double> kTimes[] = {{"s", 1},
+                                                              {"sec", 1},
+                                                              {"second", 1},
+                                                              {"seconds", 1},
+                                                              {"ms", 1e-3},
+                                                              {"msec", 1e-3},
+                                                              {"milliseconds", 1e-3},
+                                                              {"us", 1e-6},
+                                                              {"microseconds", 1e-6},
+                                                              {"ns", 1e-9},
+                                                              {"nanoseconds", 1e-9}};
+    constexpr std::pair<std::string_view, double> kLengths[] = {
+        {"mm", 1},           {"millimeters", 1},  {"millimetres", 1}, {"cm", 10},
+        {"centimeters", 10}, {"centimetres", 10}, {"m", 1000},        {"meters", 1000},
+        {"metres", 1000},    {"in", 0},           {"inch", 0},        {"inches", 0},
+        {"ft", 0},           {"dm", 0},           {"um", 0}};
+    std::vector<std::string_view> cells;
+    split(line, layout.between, cells);
+    for (const std::string_view cell : cells) {
+        double number = 0;
+        if (parse_number(cell, number)) return false;
+    }
+    const auto unit_in = [&](int column, const auto& units) -> std::optional<double> {
+        if (column < 0 || column >= static_cast<int>(cells.size())) return {};
+        std::string word = lower_case(cells[static_cast<std::size_t>(column)]);
+        std::erase_if(word, [](char c) { return std::string_view("[]() ").find(c) < 5; });
+        for (const auto& [name, value] : units)
+            if (word == name) return value;
+        return {};
+    };
+    bool any = false;
+    for (Columns& tool : layout.tools) {
+        const auto time = unit_in(tool.time, kTimes), place = unit_in(tool.place[0], kLengths);
+        any = any || time || place;
+        if (time) layout.time_unit_s = *time;
+        if (time) layout.time_unit_named = true;
+        if (place && *place > 0) {
+            tool.place_unit_mm = *place;
+            continue;
+        }
+        const auto column = static_cast<std::size_t>(tool.place[0]);
+        if (any && column < cells.size() && !is_none(cells[column]))
+            return Error{"places are in '" + std::string(cells[column].substr(0, 40)) + "'", at,
+                         "expected mm, cm or m"};
+    }
+    return any;
+}
+
 // An error for times that step like milliseconds and do not say what they are.
 Status check_unit(const std::vector<Pose>& poses, const std::string& where) {
     std::vector<double> steps;
@@ -608,7 +676,8 @@ std::string_view after(std::string_view line, std::string_view key, char between
 }
 
 // OptiTrack Motive's export: lines "Format Version", Type, Name, ID, which quantity, and
-// "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,..."; quaternions are x, y, z, w.
+// "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,..."; quaternions are x, y, z, w. Older formats do not label
+// their lines: the one below the types holds the names.
 Result<Layout> motive_layout(std::string_view& text, int& number, const std::string& where) {
     std::string_view line = next_line(text);
     const std::string at = where + ":" + std::to_string(++number);
@@ -632,13 +701,14 @@ Result<Layout> motive_layout(std::string_view& text, int& number, const std::str
     while (!text.empty()) {
         line = next_line(text);
         ++number;
+        if (line.empty()) continue;
         split(line, between, cells);
         const auto holds = [&](std::string_view word) {
             return std::find(cells.begin(), cells.end(), word) != cells.end();
         };
         if (cells.front() == "Frame") break;
-        if (holds("Type") || holds("Rigid Body")) types = cells;
-        if (holds("Name")) names = cells;
+        if (holds("Name") || (!types.empty() && names.empty())) names = cells;
+        if (types.empty() && (holds("Type") || holds("Rigid Body"))) types = cells;
         if (holds("Rotation") || holds("Position")) quantities = cells;
         if (number > 50) return Error{"has no line that begins with Frame", at, "export it again"};
     }
@@ -713,6 +783,10 @@ Result<std::vector<ToolReadings>> parse_pose_table(std::string_view text,
         layout.emplace(std::move(made));
     }
     if (!layout) return Error{"is empty", where, "expected poses as CSV"};
+    std::string_view below = text;
+    SONOCASE_TRY(const bool units,
+                 take_units(next_line(below), where + ":" + std::to_string(number + 1), *layout));
+    if (units) text = below, ++number;
     RowReader reader(*layout, where);
     std::vector<ToolReadings> tools;
     for (const Columns& columns : layout->tools) {

@@ -7,7 +7,8 @@
 // ms, us or ns (time_ms); places in m or cm (tx_m); cells between semicolons, tabs or blanks, there
 // with decimal commas; a first line after '#' or after "sep=". `frame`, a time and a status may be
 // left out: rows are numbered, all times are 0, every row counts. Cells without a number ("", NaN,
-// 1.#QNAN) for a whole pose are a tool that was lost.
+// 1.#QNAN, NDI's -3.697314e28) for a whole pose are a tool that was lost. A row of units below the
+// names ("s,mm,mm,mm") is taken.
 //
 // Several tools: a column `tool` (or name, device, port, handle, sensor, rigid_body) that says
 // whose reading a row is; columns with the tool's name before them (probe_tx, needle_qw); the same
@@ -28,10 +29,13 @@ struct ToolReadings {
     std::vector<Pose> poses;
 };
 
+// What stands where there is no number: "", "NaN", "-1.#IND", "missing".
+bool is_none(std::string_view cell);
+
 // At least one tool, those of one name joined. Rows are kept as read, NaN and poor rotations
 // included. Errors name the line: a row with too few or too many cells, what is no number, a
-// quaternion of another length than 1, a status that no row's is known; times that step like
-// milliseconds in a column that does not name its unit.
+// quaternion of another length than 1, places in inches, a status that no row's is known; times
+// that step like milliseconds in a column that does not name its unit.
 Result<std::vector<ToolReadings>> parse_pose_table(std::string_view text, const std::string& where);
 
 }  // namespace sonocase

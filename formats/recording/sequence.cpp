@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <limits>
 #include <map>
 #include <span>
 #include <string>
@@ -18,6 +19,7 @@
 
 #include "formats/base/memory.h"
 #include "formats/base/result.h"
+#include "formats/recording/pose_table.h"
 #include "formats/text/number_text.h"
 
 namespace sonocase {
@@ -483,7 +485,9 @@ Status Reader::read_transform(const HeaderLine& line, SequencePose& pose) {
                      line.number);
     }
     for (std::size_t i = 0; i < 16; ++i) {
-        if (!parse_number(words[i], pose.to_from[i])) {
+        if (parse_number(words[i], pose.to_from[i])) continue;
+        pose.to_from[i] = std::numeric_limits<double>::quiet_NaN();
+        if (!is_none(words[i])) {
             const bool comma = words[i].find(',') != std::string_view::npos;
             return fault("'" + std::string(words[i].substr(0, 30)) + "' is not a number",
                          comma ? "write decimal points" : "expected 16 numbers", line.number);
@@ -568,6 +572,7 @@ Status Reader::read_frames() {
     if (beyond > 0)
         out_.notes.push_back({"{} frames beyond the {} that the header states are left out.",
                               {std::to_string(beyond), std::to_string(frame_count)}});
+    std::size_t no_numbers = 0;
     for (std::size_t i = 0; i < frame_count; ++i) {
         if (!seen_[i])
             return fault("frame " + std::to_string(i) + " has no fields", "make the file again");
@@ -577,8 +582,14 @@ Status Reader::read_frames() {
         if (!stamped_) frame.timestamp_s = frame.unfiltered_timestamp_s;
         for (SequencePose& pose : frame.poses) {
             if (!pose.ok && pose.to_from[15] == kRefused) pose.to_from[15] = 1;
+            const bool numbers = std::all_of(pose.to_from.begin(), pose.to_from.end(),
+                                             [](double v) { return std::isfinite(v); });
+            if (pose.ok && !numbers) ++no_numbers;
         }
     }
+    if (no_numbers > 0)
+        out_.notes.push_back(
+            {"{} poses that are no numbers count as lost.", {std::to_string(no_numbers)}});
     return Done{};
 }
 

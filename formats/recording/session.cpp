@@ -173,7 +173,13 @@ SessionNames guess_names(const Sequence& sequence) {
     }
     const auto name_of = [&](ToolRole role) {
         const int found = find_tool(sequence, role);
-        return found < 0 ? std::string() : sequence.transforms[static_cast<std::size_t>(found)];
+        if (found < 0) return std::string();
+        const std::string& tool = sequence.transforms[static_cast<std::size_t>(found)];
+        const int reference = find_reference(sequence, tool);
+        if (reference < 0) return tool;
+        const std::string& base = sequence.transforms[static_cast<std::size_t>(reference)];
+        return std::string(split_transform_name(tool).from) + "To" +
+               std::string(split_transform_name(base).from);
     };
     names.probe = name_of(ToolRole::probe);
     names.needle = name_of(ToolRole::needle);
@@ -196,6 +202,17 @@ Result<Session> session_from_sequence(const Sequence& sequence,
     for (const auto& [name, index] :
          {std::pair(names.probe, probe), std::pair(names.needle, needle)}) {
         if (name.empty() || index >= 0) continue;
+        Sequence composed;  // without the images
+        composed.transforms = sequence.transforms;
+        composed.frames = sequence.frames;
+        composed.fields = sequence.fields;
+        composed.notes = sequence.notes;
+        const TransformName wanted = split_transform_name(name);
+        Message said;
+        if (compose_transform(composed, wanted.from, wanted.to, &said) >= 0) {
+            composed.notes.push_back(said);
+            return session_from_sequence(composed, names, where);
+        }
         std::string known;
         for (const std::string& t : sequence.transforms) known += (known.empty() ? "" : ", ") + t;
         return Error{"has no transform '" + name + "'", where,

@@ -107,12 +107,14 @@ struct SessionNames {
 };
 
 // The most likely names in a recording: ours if it has them, otherwise those that find_tool() takes
-// (formats/recording/tool_frames.h).
+// (formats/recording/tool_frames.h), relative to the reference where find_reference() finds one:
+// ProbeToReference then need not be in the recording.
 SessionNames guess_names(const Sequence& sequence);
 
-// Poses that are not rigid count as not tracked. Where probe and needle end in different frames,
-// one is composed with other transforms of the sequence. An Error when a named transform is
-// missing, or nothing connects the two frames.
+// Poses that are not rigid count as not tracked. A transform that the sequence lacks is composed of
+// others, and so is one of the two where probe and needle end in different frames; the notes say
+// so. An Error when a named transform is missing and follows from no others, or nothing connects
+// the two frames.
 Result<Session> session_from_sequence(const Sequence& sequence,
                                       const SessionNames& names,
                                       const std::string& where);

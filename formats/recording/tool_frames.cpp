@@ -76,7 +76,9 @@ int rank_as_tool(std::string_view transform, ToolRole role) {
     const bool is_needle = any(kNeedleWords, holds);
     int rank = 0;
     if (needle) {
-        rank = any(kNeedleWords, begins) ? 3 : is_needle ? 2 : 0;
+        if (is_needle)
+            rank = 1 + (any(kNeedleWords, begins) ? 1 : 0) + (holds("tip") ? 2 : 0) +
+                   (holds("needle") ? 4 : 0);
     } else if (!is_needle) {
         const bool image = begins("image") || tool == "us" || holds("image");
         rank = any(kProbeWords, begins) ? 4 : any(kProbeWords, holds) ? 3 : image ? 1 : 0;
@@ -164,6 +166,16 @@ void add_inverses(Sequence& sequence) {
             break;
         }
     }
+}
+
+int find_reference(const Sequence& sequence, std::string_view tool) {
+    const std::string_view tracker = split_transform_name(tool).to;
+    if (lower_case(tracker).find("tracker") == std::string::npos) return -1;
+    for (std::size_t i = 0; i < sequence.transforms.size(); ++i) {
+        const TransformName name = split_transform_name(sequence.transforms[i]);
+        if (name.to == tracker && lower_case(name.from) == "reference") return static_cast<int>(i);
+    }
+    return -1;
 }
 
 bool in_two_frames(const std::string& probe, const std::string& needle) {

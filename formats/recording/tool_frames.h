@@ -24,9 +24,10 @@ struct TransformName {
 TransformName split_transform_name(std::string_view name);
 
 enum class ToolRole { probe, needle };
-// How well a transform's name says that it is the pose of such a tool; 0: it does not. A name that
-// begins with the tool's goes before one that holds it; the probe before its image; a transform to
-// the mannequin before one to the tracker, and that before others.
+// How well a transform's name says that it is the pose of such a tool; 0: it does not. A needle
+// goes before a stylus, and its tip before the sensor on it; a name that begins with the tool's
+// before one that holds it; the probe before its image; a transform to the mannequin before one to
+// the tracker, and that before others.
 int rank_as_tool(std::string_view transform, ToolRole role);
 // The transform of highest rank, the first of several; -1: none.
 int find_tool(const Sequence& sequence, ToolRole role);
@@ -38,6 +39,10 @@ int compose_transform(Sequence& sequence,
                       std::string_view from,
                       std::string_view to,
                       Message* said = nullptr);
+
+// ReferenceToTracker, where `tool` ends in this tracker: of a sensor that is fixed to the mannequin
+// or the patient. -1: none, or `tool` ends in no tracker.
+int find_reference(const Sequence& sequence, std::string_view tool);
 
 // Adds the poses of tools that a recording has only the other way round (TrackerToProbe), with a
 // note. What ends in a tool and begins in no tracker, reference or patient is a calibration.

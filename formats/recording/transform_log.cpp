@@ -3,9 +3,11 @@
 #include "formats/recording/transform_log.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 #include <vector>
 
+#include "formats/recording/pose_table.h"
 #include "formats/recording/session.h"
 #include "formats/text/number_text.h"
 
@@ -34,7 +36,10 @@ bool parse_matrix(std::string_view text, std::array<double, 16>& matrix) {
     for (double& value : matrix) {
         text = trimmed(text);
         const std::size_t end = std::min(text.find_first_of(" \t\r\n"), text.size());
-        if (!parse_number(text.substr(0, end), value)) return false;
+        if (!parse_number(text.substr(0, end), value)) {
+            if (end == 0 || !is_none(text.substr(0, end))) return false;
+            value = std::numeric_limits<double>::quiet_NaN();
+        }
         text.remove_prefix(end);
     }
     return trimmed(text).empty();

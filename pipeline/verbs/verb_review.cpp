@@ -9,6 +9,7 @@
 #include "formats/files/atomic_file.h"
 #include "formats/files/load_save.h"
 #include "formats/files/thread_jobs.h"
+#include "formats/recording/tool_frames.h"
 #include "formats/scoring/draw_attempt.h"
 #include "formats/text/json_reader.h"
 #include "pipeline/import/mesh/surface_file.h"
@@ -119,9 +120,11 @@ int verb_score(int argc, char** argv) {
         names.needle_axis = *axis;
         if (!a.probe.empty()) names.probe = a.probe;
         if (!a.needle.empty()) names.needle = names.drawn = a.needle;
+        const TransformName probe = split_transform_name(names.probe);
         if (!names.probe.empty() && names.needle.empty())
             for (const std::string& other : sequence.transforms)
-                if (other != names.probe)
+                if (const auto from = split_transform_name(other).from;
+                    from != probe.from && from != probe.to)
                     std::fprintf(stderr,
                                  "sonocase score: note: %s is not scored: if it is the needle, "
                                  "give --needle %s\n",

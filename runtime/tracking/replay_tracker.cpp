@@ -269,6 +269,10 @@ Result<Recording> load_recording(const std::string& files,
         }
     }
     SONOCASE_TRY_DONE(bring_to_one_frame(sequence, probe, needle, files));
+    if (const int unused = find_reference(sequence, probe); reference < 0 && unused >= 0)
+        sequence.notes.push_back(
+            {"{} is not used: if the reference is fixed to the mannequin, say --tool reference={}.",
+             {name_of(unused), name_of(unused)}});
     recording.in_mannequin = to_mannequin(probe);
     recording.probe = readings_of(sequence, sequence.transform_index(probe));
     if (!needle.empty()) recording.needle = readings_of(sequence, sequence.transform_index(needle));

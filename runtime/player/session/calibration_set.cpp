@@ -76,6 +76,8 @@ std::vector<Message> calibration_warnings(const Calibrations& calibrations,
         for (const Message& concern : calibration_concerns(*calibration, now)) {
             sentences.push_back({"Calibration of the {}: {}", {calibration->kind, concern}});
         }
+        for (const std::string& warning : calibration->warnings)
+            sentences.push_back({"Calibration of the {}: {}", {calibration->kind, warning}});
     };
     look(calibrations.probe);
     look(calibrations.needle);

@@ -120,6 +120,70 @@ TEST(CalibrationFile, PlusGivesEachToolAndTheFaceOfTheProbe) {
               std::string::npos);
 }
 
+std::string transform_element(const std::string& from, const std::string& to, int x) {
+    return "<Transform From='" + from + "' To='" + to + "' Matrix='1 0 0 " + std::to_string(x) +
+           " 0 1 0 0 0 0 1 0 0 0 0 1'/>\n";
+}
+
+// A configuration keeps older calibrations in comments.
+TEST(CalibrationFile, ElementsInCommentsOfXmlAreNotRead) {
+    const auto read = [](const std::string& elements) {
+        const std::string text = "<PlusConfiguration>" + elements + "</PlusConfiguration>";
+        EXPECT_TRUE(looks_like_foreign_calibration(text));
+        return parse_foreign_calibrations(text, "PlusDeviceSet.xml");
+    };
+    const std::string old = transform_element("NeedleTip", "Needle", 1),
+                      needle = transform_element("NeedleTip", "Needle", 7);
+    for (const std::string& elements :
+         {"<!-- of May: " + old + "-->" + needle, "<![CDATA[" + old + "]]>" + needle,
+          "<!-- a > b --><!--" + old + old + "-->" + needle + "<!--" + old}) {
+        const auto found = read(elements);
+        ASSERT_TRUE(found) << found.error().message();
+        EXPECT_EQ(found->front().sensor_from_tool.translation.x, 7) << elements;
+        EXPECT_TRUE(found->front().warnings.empty());
+    }
+    const auto none = read("<!--" + old + "-->");
+    ASSERT_FALSE(none);
+    EXPECT_NE(none.error().message().find("found none"), std::string::npos);
+}
+
+TEST(CalibrationFile, ANeedleGoesBeforeAStylusAndThisIsSaid) {
+    const std::string needle = transform_element("NeedleTip", "Needle", 7),
+                      stylus = transform_element("StylusTip", "Stylus", 8);
+    for (const std::string& elements : {needle + stylus, stylus + needle}) {
+        const auto found = parse_foreign_calibrations("<a>" + elements + "</a>", "set.xml");
+        ASSERT_TRUE(found) << found.error().message();
+        ASSERT_EQ(found->size(), 1u);
+        EXPECT_EQ(found->front().sensor_from_tool.translation.x, 7);
+        ASSERT_EQ(found->front().warnings.size(), 1u);
+        EXPECT_EQ(found->front().warnings[0],
+                  "NeedleTip to Needle is the needle; not taken: StylusTip to Stylus.");
+    }
+    const auto alone = parse_foreign_calibrations("<a>" + stylus + "</a>", "set.xml");
+    ASSERT_TRUE(alone) << alone.error().message();
+    EXPECT_EQ(alone->front().sensor_from_tool.translation.x, 8);
+    EXPECT_TRUE(alone->front().warnings.empty());
+}
+
+TEST(CalibrationFile, DecimalCommasAreReadAndBinaryFilesNamed) {
+    for (const char* text : {"1;0;0;3,5\n0;1;0;-4,25\n0;0;1;150,125\n0;0;0;1\n",
+                             "1,0;0,0;0,0;3,5;0,0;1,0;0,0;-4,25;0,0;0,0;1,0;150,125",
+                             "[1, 0, 0, 3.5; 0, 1, 0, -4.25; 0, 0, 1, 150.125; 0, 0, 0, 1]"}) {
+        ASSERT_TRUE(looks_like_foreign_calibration(text)) << text;
+        const auto read = parse_foreign_calibrations(text, "needle.txt");
+        ASSERT_TRUE(read) << text << read.error().message();
+        EXPECT_EQ(read->front().sensor_from_tool.translation, (Vector3{3.5, -4.25, 150.125}));
+    }
+    // Transforms of ITK in HDF5 and in MATLAB's form.
+    for (const std::string& bytes : {std::string("\x89HDF\r\n\x1a\n\0\0\0", 11),
+                                     std::string("\0\0\0\0\x0c\0\0\0\x01\0\0\0", 12)}) {
+        ASSERT_TRUE(looks_like_foreign_calibration(bytes));
+        const auto refused = parse_foreign_calibrations(bytes, "needle.h5");
+        ASSERT_FALSE(refused);
+        EXPECT_NE(refused.error().message().find(".tfm or .txt"), std::string::npos);
+    }
+}
+
 TEST(CalibrationFile, AMirrorIsNoRotationAndAnUnknownKindIsNamed) {
     Calibration c;
     c.kind = "probe";

@@ -111,6 +111,34 @@ TEST(Sequence, ReadsWhatOthersWrite) {
     EXPECT_EQ(s->pixels, (Bytes{'a', 'b'}));
 }
 
+TEST(Sequence, PosesThatAreNoNumbersAreLostAndCounted) {
+    std::string text = "ObjectType = Image\nNDims = 3\nDimSize = 1 1 4\nElementType = MET_UCHAR\n";
+    const char* nothing[] = {"", "-1.#IND ", "nan ", "-nan(ind) "};
+    for (int i = 0; i < 4; ++i) {
+        const std::string frame = "Seq_Frame000" + std::to_string(i) + "_";
+        std::string matrix = "1 0 0 5 0 1 0 0 0 0 1 0 0 0 0 1";
+        if (i > 0) {
+            matrix.clear();
+            for (int k = 0; k < 15; ++k) matrix += nothing[i];
+            matrix += "1";
+        }
+        text += frame + "NeedleToTrackerTransform = " + matrix + "\n" + frame +
+                "NeedleToTrackerTransformStatus = OK\n" + frame +
+                "ProbeToTrackerTransform = 1 0 0 5 0 1 0 0 0 0 1 0 0 0 0 1\n";
+    }
+    text += "ElementDataFile = LOCAL\nabcd";
+    const auto s = read_sequence(Bytes(text.begin(), text.end()), "s");
+    ASSERT_TRUE(s) << s.error().message();
+    for (std::size_t i = 0; i < 4; ++i) {
+        EXPECT_EQ(rigid_from_matrix(s->frames[i].poses[0].to_from).has_value(), i == 0);
+        EXPECT_TRUE(rigid_from_matrix(s->frames[i].poses[1].to_from));
+    }
+    ASSERT_EQ(s->notes.size(), 1u);
+    EXPECT_EQ(s->notes[0], "3 poses that are no numbers count as lost.");
+    text.replace(text.find("-1.#IND"), 7, "-1.#WHAT");
+    EXPECT_FALSE(read_sequence(Bytes(text.begin(), text.end()), "s"));
+}
+
 TEST(Sequence, FramesBeyondTheSizeAreDropped) {
     std::string text(
         reinterpret_cast<const char*>(write_sequence(example(5, 1, 1), SequenceForm::mha).data()),

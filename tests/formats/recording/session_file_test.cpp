@@ -154,6 +154,9 @@ TEST(TransformLog, ReadsTheToolsInTurn) {
     const auto session = session_from_sequence(*log, guess_names(*log), "log.xml");
     ASSERT_TRUE(session) << session.error().message();
     EXPECT_EQ(session->events.size(), 1u);
+    std::string lost = xml;
+    lost.replace(lost.find("1 0 0 10"), 8, "-1.#IND 0 0 10");
+    EXPECT_TRUE(parse_transform_log(lost, "log.xml"));
     for (std::size_t n = 0; n < xml.size(); ++n) (void)parse_transform_log(xml.substr(0, n), "cut");
     EXPECT_FALSE(parse_transform_log("<TransformRecorderLog/>", "empty"));
 }

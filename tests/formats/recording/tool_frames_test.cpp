@@ -36,6 +36,17 @@ TEST(ToolFrames, NamesSayWhichTransformIsATool) {
     EXPECT_EQ(found({"probe_1ToTracker", "NEEDLEToTracker"}, ToolRole::probe), "probe_1ToTracker");
     EXPECT_EQ(found({"UsProbeToReference", "StylusTipToReference"}, ToolRole::probe),
               "UsProbeToReference");
+    // The sensor is not the tip, in whatever order they stand, and a stylus is no needle.
+    for (const std::string tip : {"NeedleTip", "StylusTip", "needle_tip"}) {
+        const std::string sensor = tip.starts_with("S") ? "Stylus" : "Needle";
+        const std::string best = tip + "ToReference";
+        for (const std::string to : {"ToReference", "ToTracker"}) {
+            EXPECT_EQ(found({sensor + to, best}, ToolRole::needle), best);
+            EXPECT_EQ(found({best, sensor + to}, ToolRole::needle), best);
+        }
+    }
+    EXPECT_EQ(found({"StylusTipToTracker", "NeedleToTracker"}, ToolRole::needle),
+              "NeedleToTracker");
     EXPECT_EQ(split_transform_name("ToolToTracker").from, "Tool");
     EXPECT_EQ(split_transform_name("StylusToRAS").to, "RAS");
     EXPECT_EQ(split_transform_name("Stylus").to, "");
@@ -68,7 +79,7 @@ Moving moving_reference() {
 TEST(ToolFrames, ToolsThatEndInTwoFramesAreBroughtToOne) {
     const Moving given = moving_reference();
     const SessionNames names = guess_names(given.sequence);
-    EXPECT_EQ(names.probe, "ProbeToTracker");
+    EXPECT_EQ(names.probe, "ProbeToReference");
     const auto session = session_from_sequence(given.sequence, names, "s");
     ASSERT_TRUE(session) << session.error().message();
     ASSERT_EQ(session->notes.size(), 1u);
@@ -87,6 +98,49 @@ TEST(ToolFrames, ToolsThatEndInTwoFramesAreBroughtToOne) {
     const auto refused = session_from_sequence(apart, guess_names(apart), "s");
     ASSERT_FALSE(refused);
     EXPECT_NE(refused.error().message().find("ReferenceToTracker"), std::string::npos);
+}
+
+// Raw recordings of PLUS: the tracker's frame is not the mannequin's where that moves.
+TEST(ToolFrames, ToolsOfATrackerAreTakenRelativeToItsReference) {
+    Moving given = moving_reference();
+    given.sequence.transforms[1] = "NeedleToTracker";
+    for (std::size_t i = 0; i < given.needle.size(); ++i) {
+        auto& poses = given.sequence.frames[i].poses;
+        const Rigid reference = *rigid_from_matrix(poses[2].to_from);
+        poses[1].to_from = matrix_from_rigid(reference * given.needle[i]);
+    }
+    SessionNames named;
+    named.probe = "ProbeToReference";
+    named.needle = "NeedleToReference";
+    for (const SessionNames& names : {guess_names(given.sequence), named}) {
+        EXPECT_EQ(names.probe, "ProbeToReference");
+        const auto session = session_from_sequence(given.sequence, names, "s");
+        ASSERT_TRUE(session) << session.error().message();
+        ASSERT_EQ(session->notes.size(), 2u);
+        EXPECT_EQ(session->notes[1],
+                  "NeedleToReference is composed of NeedleToTracker, ReferenceToTracker.");
+        for (std::size_t i = 0; i < given.probe.size(); ++i) {
+            const SessionSample& s = session->samples[i];
+            ASSERT_EQ(s.probe_ok, i != 7);
+            ASSERT_EQ(s.needle_ok, i != 7);
+            if (i == 7) continue;
+            EXPECT_LT(norm(s.mannequin_from_probe.translation - given.probe[i].translation), 1e-9);
+            EXPECT_LT(norm(s.mannequin_from_needle.translation - given.needle[i].translation),
+                      1e-9);
+        }
+    }
+    // Who names the tracker's frame gets it; other frames are the tools' own.
+    named.probe = "ProbeToTracker";
+    named.needle = "NeedleToTracker";
+    const auto raw = session_from_sequence(given.sequence, named, "s");
+    ASSERT_TRUE(raw) << raw.error().message();
+    EXPECT_TRUE(raw->notes.empty());
+    for (const std::string to : {"Mannequin", "RAS"}) {
+        Sequence other = given.sequence;
+        other.transforms = {"ProbeTo" + to, "NeedleTo" + to, "ReferenceTo" + to};
+        EXPECT_EQ(guess_names(other).probe, "ProbeTo" + to);
+        EXPECT_EQ(guess_names(other).needle, "NeedleTo" + to);
+    }
 }
 
 // A recording that has its tools the other way round only; calibrations are none of them.
@@ -235,14 +289,18 @@ TEST(PoseTables, OfSeveralToolsGiveEachItsOwn) {
         motive += n + "," + t + "," + cells(probe[i], 1e-3, true, ',') + ",0.001,5," +
                   (lost ? ",,,,,," : cells(needle[i], 1e-3, true, ',')) + "\n";
     }
+    std::string unlabelled = motive;  // as older formats are
+    for (const std::string label : {",Type,", ",Name,"})
+        unlabelled.replace(unlabelled.find(label), label.size(), ",,");
     const testing::TemporaryFolder folder;
     const std::pair<const char*, std::pair<std::string, std::string>> forms[] = {
         {"by_row.csv", {"ProbeToTracker", "NeedleToTracker"}},
         {"by_prefix.csv", {"probeToTracker", "needleToTracker"}},
         {"ndi.csv", {"port_1ToTracker", "port_2ToTracker"}},
-        {"motive.csv", {"ProbeToTracker", "NeedleToTracker"}}};
-    const std::string* texts[] = {&by_row, &by_prefix, &ndi, &motive};
-    for (std::size_t form = 0; form < 4; ++form) {
+        {"motive.csv", {"ProbeToTracker", "NeedleToTracker"}},
+        {"unlabelled.csv", {"ProbeToTracker", "NeedleToTracker"}}};
+    const std::string* texts[] = {&by_row, &by_prefix, &ndi, &motive, &unlabelled};
+    for (std::size_t form = 0; form < 5; ++form) {
         const auto& [file, names] = forms[form];
         const auto read = load_recording_file(folder.write(file, *texts[form]));
         ASSERT_TRUE(read) << read.error().message();
@@ -372,6 +430,48 @@ TEST(PoseTables, OtherNamesAreUnderstood) {
         "timestamp,tx,ty,tz,qw,qx,qy,qz\n2024-05-01T12:00:00,1,2,3,1,0,0,0\n", "p");
     ASSERT_FALSE(date);
     EXPECT_NE(date.error().message().find("numbers of seconds"), std::string::npos);
+}
+
+TEST(PoseTables, ARowOfUnitsBelowTheNamesIsTaken) {
+    const auto read = [](const std::string& units) {
+        return parse_pose_table(
+            "time,tx,ty,tz,qw,qx,qy,qz\n" + units + "\n0,1,2,3,1,0,0,0\n500,2,2,3,1,0,0,0\n", "p");
+    };
+    for (const auto& [units, scale, last_s] :
+         {std::tuple{"s,mm,mm,mm,,,,", 1.0, 500.0},
+          {"ms,m,m,m,-,-,-,-", 1000.0, 0.5},
+          {"[s],[cm],[cm],[cm],quaternion,quaternion,quaternion,quaternion", 10.0, 500.0}}) {
+        const auto table = read(units);
+        ASSERT_TRUE(table) << table.error().message();
+        const std::vector<Pose>& poses = table->front().poses;
+        ASSERT_EQ(poses.size(), 2u) << units;
+        EXPECT_EQ(poses[0].tracker_from_tool.translation, scale * (Vector3{1, 2, 3})) << units;
+        EXPECT_NEAR(poses[1].timestamp_s, last_s, 1e-9) << units;
+    }
+    const auto inches = read("s,in,in,in,,,,");
+    ASSERT_FALSE(inches);
+    EXPECT_EQ(inches.error().message(), "p:2: places are in 'in'; expected mm, cm or m");
+    EXPECT_FALSE(read("s,a,b,c,,,,"));
+    EXPECT_FALSE(read("a,b,c,d,,,,"));
+    for (const char* names :
+         {"t,x (in),y (in),z (in)", "t,probe_tx_inch,probe_ty_inch,probe_tz_inch"}) {
+        const auto named =
+            parse_pose_table(std::string(names) + ",qw,qx,qy,qz\n0,1,2,3,1,0,0,0\n", "p");
+        ASSERT_FALSE(named);
+        EXPECT_NE(named.error().message().find("unit of"), std::string::npos)
+            << named.error().message();
+    }
+}
+
+// What NDI's programs write for what was not measured.
+TEST(PoseTables, NdisMissingValueIsALostTool) {
+    std::string text = "Frame,Q0,Qx,Qy,Qz,Tx,Ty,Tz\n0,1,0,0,0,1,2,3\n1";
+    for (int i = 0; i < 7; ++i) text += ",-3.697314e28";
+    const auto table = parse_pose_table(text + "\n", "p");
+    ASSERT_TRUE(table) << table.error().message();
+    ASSERT_EQ(table->front().poses.size(), 2u);
+    EXPECT_TRUE(table->front().poses[0].ok);
+    EXPECT_FALSE(table->front().poses[1].ok);
 }
 
 TEST(PoseTables, OneToolTwiceInARowIsRefused) {

@@ -270,6 +270,9 @@ TEST(LoadRecording, WhatIsNotPlayedOrDoesNotCountIsSaid) {
     EXPECT_NE(
         note_of("ProbeToTracker", "MarkerToTracker", good).find("--tool needle=MarkerToTracker"),
         std::string::npos);
+    EXPECT_NE(note_of("ProbeToTracker", "ReferenceToTracker", good)
+                  .find("--tool reference=ReferenceToTracker"),
+              std::string::npos);
     EXPECT_NE(note_of("TrackerToProbe", "NeedleToTracker", good).find("inverse of TrackerToProbe"),
               std::string::npos);
 }

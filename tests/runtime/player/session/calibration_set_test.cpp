@@ -19,6 +19,10 @@ TEST(CalibrationWarnings, NameACalibrationOfAnotherSensorAndAnOldOne) {
     calibrations.probe->date = "2026-01-01T00:00:00Z";
     EXPECT_TRUE(calibration_warnings(calibrations, "Polhemus Viper (SN 1)", "2026-01-02T00:00:00Z")
                     .empty());
+    calibrations.probe->warnings = {"ProbeFace is the probe."};
+    EXPECT_EQ(calibration_warnings(calibrations, "", "2026-01-02T00:00:00Z").front(),
+              "Calibration of the probe: ProbeFace is the probe.");
+    calibrations.probe->warnings.clear();
     EXPECT_EQ(
         calibration_warnings(calibrations, "Polhemus Viper (SN 2)", "2026-01-02T00:00:00Z").size(),
         1u);
