@@ -248,12 +248,17 @@ int verb_progress(int argc, char** argv) {
     }
     if (!kept.empty()) return kDone;
     if (!remove.empty()) {
-        std::vector<std::string> left;
-        if (auto s = book->remove_trainee(remove, &left); !s) return fail("progress", s.error());
-        for (const std::string& file : left) {
+        const auto removed = book->remove_trainee(remove);
+        if (!removed) return fail("progress", removed.error());
+        for (const std::string& file : removed->not_deleted) {
             std::fprintf(stderr, "sonocase progress: warning: could not delete %s\n", file.c_str());
         }
+        std::printf("removed %s: sessions %zu, recordings %zu, review pages %zu\n", remove.c_str(),
+                    removed->sessions, removed->recordings, removed->reviews);
         return kDone;
+    }
+    if (!trainee.empty()) {
+        if (auto s = book->expect_trainee(trainee); !s) return fail("progress", s.error());
     }
     if (!csv.empty()) {
         const auto text = book->csv(trainee, exercise);
