@@ -145,6 +145,8 @@ int verb_score(int argc, char** argv) {
     auto found = find_review_exercise(bundle, a.exercise, session->header.exercise, warnings);
     if (!found) return fail("score", found.error());
     Exercise& exercise = found->exercise;
+    for (const Message& warning : mismatch_warnings(session->header, bundle, a.exercise, exercise))
+        warnings.push_back(warning);
     if (const std::uint64_t seed = attempt_seed(session->header); seed != 0 && !a.bundle.empty()) {
         const CaseAnatomy at_rest(bundle);
         exercise = draw_attempt(exercise, at_rest, bundle.labels, seed).exercise;
@@ -163,8 +165,9 @@ int verb_score(int argc, char** argv) {
     ScoreOptions options;
     ThreadJobs jobs(common.threads);
     options.jobs = &jobs;
-    const SessionScore score =
-        score_session(*session, exercise, anatomy.get(), bundle.labels, options);
+    SessionScore score = score_session(*session, exercise, anatomy.get(), bundle.labels, options);
+    if (!a.bundle.empty())
+        score.warnings.insert(score.warnings.begin(), warnings.begin(), warnings.end());
     const std::string json = score_json(score, exercise);
     if (a.json) {
         std::fputs(json.c_str(), stdout);

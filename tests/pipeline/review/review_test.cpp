@@ -265,6 +265,23 @@ TEST(Review, AnotherCaseAndAMissingExerciseAreSaid) {
     ASSERT_FALSE(wrong);
     EXPECT_NE(wrong.error().message().find("scan"), std::string::npos);
     EXPECT_FALSE(load_review(files.bundle, files.bundle, {}));
+    options.exercise = "scan";
+    const auto other = load_review(files.session, files.bundle, options);
+    ASSERT_TRUE(other);
+    ASSERT_EQ(other->warnings.size(), 2u);
+    EXPECT_EQ(std::string(other->warnings[0]),
+              "The session was recorded on the case 'another' and not on 'cylinder'.");
+    EXPECT_EQ(std::string(other->warnings[1]),
+              "The session was recorded for the exercise 'gone' and not for 'scan'.");
+    // `sonocase score` says the same.
+    for (const char* form : {"", " --json"}) {
+        const auto said =
+            testing::run_command(SONOCASE_BIN "/sonocase score " + files.session + " --case " +
+                                 files.bundle + " --exercise scan" + form);
+        EXPECT_EQ(said.status, 0) << said.error;
+        for (const Message& warning : other->warnings)
+            EXPECT_NE(said.out.find(std::string(warning)), std::string::npos) << form << said.out;
+    }
     EXPECT_FALSE(load_review(files.session, files.session, {}));
 }
 
