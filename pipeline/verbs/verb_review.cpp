@@ -219,6 +219,14 @@ Result<ProgressEntry> kept_entry(const std::string& path) {
     return progress_entry(session.header, score, failed ? recording : whole);
 }
 
+// Spaces up to a column, counted in characters and not in bytes of UTF-8.
+std::string padded(std::string text, std::ptrdiff_t wide) {
+    const auto characters =
+        std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; });
+    text.append(static_cast<std::size_t>(std::max<std::ptrdiff_t>(wide - characters, 0)), ' ');
+    return text;
+}
+
 }  // namespace
 
 int verb_progress(int argc, char** argv) {
@@ -280,8 +288,8 @@ int verb_progress(int argc, char** argv) {
         for (const Metric& m : e.metrics) {
             if (m.name == "final_tip_to_target_mm") error = m.value;
         }
-        std::printf("%s  %-20s %-24s %-10s", e.started.c_str(), e.trainee.c_str(),
-                    e.exercise.c_str(), e.passed ? "passed" : "not passed");
+        std::printf("%s  %s %s %-10s", e.started.c_str(), padded(e.trainee, 20).c_str(),
+                    padded(e.exercise, 24).c_str(), e.passed ? "passed" : "not passed");
         if (std::isfinite(error)) std::printf("  tip to target %.1f mm", error);
         std::printf("\n");
     }

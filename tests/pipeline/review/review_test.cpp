@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <regex>
 #include <set>
+#include <sstream>
 
 #include "formats/exercise/metric_table.h"
 #include "formats/files/atomic_file.h"
@@ -238,6 +239,28 @@ TEST(Review, IsWrittenInTheLanguageOfItsReader) {
         EXPECT_NE(page.find(words), std::string::npos) << words;
     for (const char* words : {"Time line", "All scores", "needle entry", "tip to target", "{{"})
         EXPECT_EQ(page.find(words), std::string::npos) << words;
+}
+
+TEST(Progress, ColumnsStandUnderEachOtherWhateverTheNames) {
+    const testing::TemporaryFolder folder;
+    const std::string path = folder / "book.sqlite";
+    ProgressEntry entry;
+    entry.started = "2026-01-02T00:00:00Z";
+    entry.exercise = "line";
+    for (const char* name : {"Bjoern", "Bj\u00f6rn", "\u0141ucja \u017b\u00f3\u0142\u0107"}) {
+        entry.trainee = name;
+        ASSERT_TRUE(ProgressBook::open(path)->add(entry));
+    }
+    const auto said = testing::run_command(SONOCASE_BIN "/sonocase progress --progress " + path);
+    ASSERT_EQ(said.status, 0) << said.error;
+    std::set<std::ptrdiff_t> columns;
+    std::istringstream in(said.out);
+    for (std::string line; std::getline(in, line);) {
+        const std::string before = line.substr(0, line.find("line"));
+        columns.insert(
+            std::count_if(before.begin(), before.end(), [](char c) { return (c & 0xC0) != 0x80; }));
+    }
+    EXPECT_EQ(columns.size(), 1u) << said.out;
 }
 
 TEST(Review, ALanguageThatIsNotThereIsWrongUsage) {
