@@ -241,6 +241,22 @@ TEST(Review, IsWrittenInTheLanguageOfItsReader) {
         EXPECT_EQ(page.find(words), std::string::npos) << words;
 }
 
+// As the window does.
+TEST(Review, NamesTheNearestTargetInWordsOfItsLanguage) {
+    Files files;
+    for (const auto& [language, target] : {std::pair("de", ">Herd<"), {"en", ">Lesion<"}}) {
+        ReviewOptions options;
+        options.language = language;
+        auto input = load_review(files.session, files.bundle, options);
+        ASSERT_TRUE(input) << input.error().message();
+        ASSERT_FALSE(input->exercise.targets.empty());
+        input->exercise.targets[0].name = "lesion";
+        input->score.insertions.resize(1);
+        input->score.insertions[0].target = 0;
+        EXPECT_NE(review_page(*input, {}).find(target), std::string::npos) << language;
+    }
+}
+
 TEST(Progress, ColumnsStandUnderEachOtherWhateverTheNames) {
     const testing::TemporaryFolder folder;
     const std::string path = folder / "book.sqlite";
