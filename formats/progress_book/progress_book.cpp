@@ -4,17 +4,23 @@
 
 #include <sqlite3.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <map>
+#include <set>
 #include <string_view>
 
 #include "formats/exercise/metric_table.h"
+#include "formats/text/nearest_name.h"
 #include "formats/text/number_text.h"
 
 namespace sonocase {
 namespace {
+
+namespace fs = std::filesystem;
 
 // 2: seed; 3: attempts of one second stand side by side; 4: exam, checklists, answers
 constexpr int kVersion = 4;
@@ -67,6 +73,25 @@ class Statement {
   private:
     sqlite3_stmt* raw_ = nullptr;
 };
+
+// The recordings in a folder, and their pictures, whose headers name the trainee.
+std::vector<std::string> recordings_of(const std::string& trainee, const fs::path& folder) {
+    std::vector<std::string> files;
+    std::error_code none;
+    for (fs::directory_iterator it(folder, none), end; !none && it != end; it.increment(none)) {
+        const std::string file = it->path().string();
+        std::error_code gone;
+        if (trainee.empty() || !file.ends_with(".igs.mha") ||
+            !fs::is_regular_file(it->symlink_status(gone)))
+            continue;
+        std::string start(8192, '\0');
+        std::ifstream in(file, std::ios::binary);
+        in.read(start.data(), static_cast<std::streamsize>(start.size()));
+        start.resize(static_cast<std::size_t>(in.gcount()));
+        if (trainee_in_header(start) == trainee) files.push_back(file);
+    }
+    return files;
+}
 
 // A name that a spreadsheet would run as a formula gets an apostrophe, which it takes for text.
 std::string csv_cell(const std::string& given) {
@@ -122,8 +147,8 @@ ProgressBook& ProgressBook::operator=(ProgressBook&&) noexcept = default;
 
 Result<ProgressBook> ProgressBook::open(const std::string& path) {
     std::error_code failed;
-    const auto folder = std::filesystem::path(path).parent_path();
-    if (!folder.empty()) std::filesystem::create_directories(folder, failed);
+    const auto folder = fs::path(path).parent_path();
+    if (!folder.empty()) fs::create_directories(folder, failed);
     if (failed) return Error{"cannot create its folder: " + failed.message(), path, ""};
     auto impl = std::make_unique<Impl>();
     impl->path = path;
@@ -307,27 +332,60 @@ Result<std::vector<std::string>> ProgressBook::trainees() const {
     return names;
 }
 
-Status ProgressBook::remove_trainee(const std::string& trainee,
-                                    std::vector<std::string>* not_deleted) {
+Status ProgressBook::expect_trainee(const std::string& trainee) const {
+    SONOCASE_TRY(auto names, trainees());
+    SONOCASE_TRY(const auto given, answers(""));
+    for (const CourseAnswer& answer : given) names.push_back(answer.trainee);
+    if (std::find(names.begin(), names.end(), trainee) != names.end()) return Done{};
+    const std::string nearest = nearest_name(trainee, names);
+    return Error{"has no trainee '" + trainee + "'", impl_->path,
+                 nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
+}
+
+Result<RemovedTrainee> ProgressBook::remove_trainee(const std::string& trainee) {
+    RemovedTrainee removed;
+    const fs::path folder = fs::path(impl_->path).parent_path() / "sessions";
     SONOCASE_TRY(const auto entries, sessions(trainee, ""));
+    std::set<std::string> recordings;
     for (const ProgressEntry& e : entries) {
-        if (e.recording.empty() || e.trainee != trainee) continue;
-        std::string pictures = e.recording;
-        const std::size_t ending = pictures.rfind(".igs.mha");
-        if (ending != std::string::npos)
-            pictures.replace(ending, std::string::npos, ".frames.igs.mha");
-        for (const std::string& file : {e.recording, pictures, e.recording + ".scores.json"}) {
-            std::error_code failed;
-            std::filesystem::remove(file, failed);
-            if (failed && not_deleted) not_deleted->push_back(file);
-        }
+        if (e.trainee != trainee) continue;
+        ++removed.sessions;
+        if (!e.recording.empty()) recordings.insert(e.recording);
+    }
+    // Attempts that were too short for the book, and those of a book that is gone.
+    for (const std::string& file : recordings_of(trainee, folder)) recordings.insert(file);
+    if (recordings.empty()) SONOCASE_TRY_DONE(expect_trainee(trainee));
+    const auto remove = [&removed](const std::string& file) {
+        std::error_code failed;
+        const bool gone = fs::remove(file, failed);
+        if (failed) removed.not_deleted.push_back(file);
+        return gone;
+    };
+    for (const std::string& recording : recordings) {
+        // Pictures are listed by themselves where their recording was deleted by hand.
+        const bool pictures = recording.ends_with(".frames.igs.mha");
+        if (remove(recording) && !pictures) ++removed.recordings;
+        if (pictures) continue;
+        remove(recording + ".scores.json");
+        const std::string_view ending = recording.ends_with(".igs.mha") ? ".igs.mha" : ".mha";
+        if (!recording.ends_with(ending)) continue;
+        const std::string stem = recording.substr(0, recording.size() - ending.size());
+        remove(stem + ".frames.igs.mha");
+        const std::string review = stem + ".review";
+        std::error_code none;
+        if (!fs::equivalent(fs::path(review).parent_path(), folder, none) ||
+            !fs::is_directory(fs::symlink_status(review, none)))
+            continue;
+        if (remove(review + "/review.html")) ++removed.reviews;
+        remove(review + "/scores.json");
+        fs::remove(review, none);  // stays where it has files of others
     }
     for (const char* sql :
          {"DELETE FROM session WHERE trainee=?", "DELETE FROM answer WHERE trainee=?"}) {
         Statement rows(impl_->db, sql);
         if (rows.bind(1, trainee).step() != SQLITE_DONE) return impl_->fault("cannot remove");
     }
-    return Done{};
+    return removed;
 }
 
 Result<std::string> ProgressBook::csv(const std::string& trainee,

@@ -17,6 +17,13 @@
 
 namespace sonocase {
 
+struct RemovedTrainee {
+    std::size_t sessions = 0;    // of the book
+    std::size_t recordings = 0;  // with their pictures and kept scores
+    std::size_t reviews = 0;
+    std::vector<std::string> not_deleted;  // files that could not be deleted
+};
+
 class ProgressBook {
   public:
     // Creates the file and its folder if they are missing. A book of an older version is brought to
@@ -39,10 +46,13 @@ class ProgressBook {
     Status add(const CourseAnswer& answer);
     // In the order in which they were given; an empty name matches all.
     Result<std::vector<CourseAnswer>> answers(const std::string& trainee) const;
-    // Removes the rows and the files of the recordings; `not_deleted` lists files that could not be
-    // deleted.
-    Status remove_trainee(const std::string& trainee,
-                          std::vector<std::string>* not_deleted = nullptr);
+    // An Error, with the nearest name, where the book has neither sessions nor answers of this
+    // trainee.
+    Status expect_trainee(const std::string& trainee) const;
+    // Removes the rows and the files of the recordings, and from the folder `sessions` beside the
+    // book every recording whose header has this name, and the review pages of all of these.
+    // Errors: nobody has the name.
+    Result<RemovedTrainee> remove_trainee(const std::string& trainee);
     // One row per session, one column per score in the order of metric_table(); RFC 4180.
     Result<std::string> csv(const std::string& trainee, const std::string& exercise) const;
 

@@ -316,6 +316,16 @@ std::vector<SequenceField> fields_from_header(const SessionHeader& header) {
     return fields;
 }
 
+std::string trainee_in_header(std::string_view start) {
+    start = start.substr(0, start.find("\nSeq_Frame"));
+    if (start.find("\nSonocaseSession = 1\n") == std::string_view::npos) return {};
+    constexpr std::string_view kName = "\nSonocaseTrainee = ";
+    const std::size_t at = start.find(kName);
+    if (at == std::string_view::npos) return {};
+    start.remove_prefix(at + kName.size());
+    return std::string(start.substr(0, start.find('\n')));
+}
+
 std::uint64_t attempt_seed(const SessionHeader& header) {
     const std::string text = detail_value(header.attempt, "seed");
     std::uint64_t seed = 0;

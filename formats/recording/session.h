@@ -127,6 +127,9 @@ Sequence sequence_from_session(const Session& session);
 SequenceFrame frame_from_sample(const SessionSample& sample,
                                 const std::vector<SessionEvent>& events);
 std::vector<SequenceField> fields_from_header(const SessionHeader& header);
+// The trainee of a session's file or of its pictures, of which `start` is the beginning (8 KiB hold
+// the header); empty: it names none, or is no session.
+std::string trainee_in_header(std::string_view start);
 
 // Seed of the attempt (formats/scoring/draw_attempt.h); 0: the exercise as written.
 std::uint64_t attempt_seed(const SessionHeader& header);

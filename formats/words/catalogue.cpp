@@ -7,6 +7,8 @@
 #include <cstdlib>
 #include <utility>
 
+#include "formats/base/clinical_names.h"
+
 namespace sonocase {
 namespace {
 
@@ -94,6 +96,16 @@ std::string Language::words(const Message& message) const {
     std::vector<std::string> arguments;
     for (const Message& argument : message.arguments()) arguments.push_back(words(argument));
     return filled_in(words(message.format()), arguments);
+}
+
+std::string Language::tissue_words(const std::string& label) const {
+    const LabelParts parts = label_parts(label);
+    const std::string* known = find(parts.words);
+    if (!known) return clinical_name(label);
+    std::string out = *known;
+    if (!parts.side.empty()) out += " " + words(std::string_view(parts.side));
+    if (!parts.number.empty()) out += " " + parts.number;
+    return out;
 }
 
 std::span<const Language> languages() {

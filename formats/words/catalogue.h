@@ -29,6 +29,9 @@ struct Language {
     std::string words(std::string_view english) const;
     // The format and each argument by themselves; what the catalogue lacks stays as it is.
     std::string words(const Message& message) const;
+    // The name of a label or target as clinicians write it: "kidney_left" is "Left kidney", "Niere
+    // links" (formats/base/clinical_names.h). A name that the catalogue lacks stays English.
+    std::string tissue_words(const std::string& label) const;
 };
 
 std::span<const Language> languages();  // English first

@@ -483,8 +483,9 @@ std::string insertions(const Page& page) {
              {"entry", shown(s.entry_s - start_s, "t_s")},
              {"exit", s.still_in ? page.words("stays in") : shown(s.exit_s - start_s, "t_s")},
              {"deepest", shown(s.deepest_mm, "d_mm")},
-             {"target",
-              s.target < 0 ? "\u2013" : escaped_html(input.exercise.targets[target].name)},
+             {"target", s.target < 0 ? "\u2013"
+                                     : escaped_html(input.language->tissue_words(
+                                           input.exercise.targets[target].name))},
              {"tip_to_target", shown(s.tip_to_target_mm, "d_mm")}});
     }
     return page.filled("insertions", {{"rows", rows}});

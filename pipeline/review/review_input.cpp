@@ -61,6 +61,30 @@ Result<ReviewedExercise> find_review_exercise(const CaseBundle& bundle,
     return ReviewedExercise{std::move(free_scan), {}};
 }
 
+std::vector<Message> mismatch_warnings(const SessionHeader& header,
+                                       const CaseBundle& bundle,
+                                       const std::string& wanted,
+                                       const Exercise& exercise) {
+    std::vector<Message> warnings;
+    if (!header.case_name.empty() && header.case_name != bundle.manifest.case_name) {
+        warnings.push_back({"The session was recorded on the case '{}' and not on '{}'.",
+                            {header.case_name, bundle.manifest.case_name}});
+    }
+    if (!header.exercise.empty() && header.exercise != exercise.name) {
+        warnings.push_back({"The session was recorded for the exercise '{}' and not for '{}'.",
+                            {header.exercise, exercise.name}});
+    }
+    if (!wanted.empty() || header.exercise_digest.empty()) return warnings;
+    for (const EmbeddedExercise& embedded : bundle.exercises) {
+        if (embedded.name == header.exercise &&
+            digest_of(embedded.toml) != header.exercise_digest) {
+            warnings.push_back(
+                "The exercise was changed after this session: the marks are today's.");
+        }
+    }
+    return warnings;
+}
+
 Result<ReviewInput> load_review(const std::string& session_path,
                                 const std::string& bundle_path,
                                 const ReviewOptions& options) {
@@ -83,27 +107,17 @@ Result<ReviewInput> load_review(const std::string& session_path,
     SONOCASE_TRY(auto bundle, load_bundle(bundle_path));
     input.bundle = std::move(bundle);
     const SessionHeader& header = input.session.header;
-    if (!header.case_name.empty() && header.case_name != input.bundle.manifest.case_name) {
-        input.warnings.push_back({"The session was recorded on the case '{}' and not on '{}'.",
-                                  {header.case_name, input.bundle.manifest.case_name}});
-    }
     SONOCASE_TRY(const auto reviewed, find_review_exercise(input.bundle, options.exercise,
                                                            header.exercise, input.warnings));
+    for (const Message& warning :
+         mismatch_warnings(header, input.bundle, options.exercise, reviewed.exercise))
+        input.warnings.push_back(warning);
     const CaseAnatomy at_rest(input.bundle);
     AttemptDraw drawn =
         draw_attempt(reviewed.exercise, at_rest, input.bundle.labels, attempt_seed(header));
     input.exercise = std::move(drawn.exercise);
     input.texts = texts_in(input.exercise, reviewed.texts, input.language->code);
     input.warnings.insert(input.warnings.end(), drawn.warnings.begin(), drawn.warnings.end());
-    if (options.exercise.empty() && !header.exercise_digest.empty()) {
-        for (const EmbeddedExercise& embedded : input.bundle.exercises) {
-            if (embedded.name == header.exercise &&
-                digest_of(embedded.toml) != header.exercise_digest) {
-                input.warnings.push_back(
-                    "The exercise was changed after this session: the marks are today's.");
-            }
-        }
-    }
     const CaseAnatomy anatomy(input.bundle, breathing_shown(input.exercise, header));
     ScoreOptions score;
     ThreadJobs jobs(options.threads);

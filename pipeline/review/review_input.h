@@ -51,6 +51,13 @@ struct ReviewedExercise {
     std::vector<ExerciseTexts> texts;  // in other languages
 };
 
+// What of the bundle and of the exercise that was found is not the session's own: another case,
+// another exercise than the one that was recorded, or one that was changed since.
+std::vector<Message> mismatch_warnings(const SessionHeader& header,
+                                       const CaseBundle& bundle,
+                                       const std::string& wanted,
+                                       const Exercise& exercise);
+
 // Returns the exercise of that name in the bundle, or of that TOML file, or a free scan if there is
 // neither.
 Result<ReviewedExercise> find_review_exercise(const CaseBundle& bundle,

@@ -148,6 +148,8 @@ int verb_score(int argc, char** argv) {
     auto found = find_review_exercise(bundle, a.exercise, session->header.exercise, warnings);
     if (!found) return fail("score", found.error());
     Exercise& exercise = found->exercise;
+    for (const Message& warning : mismatch_warnings(session->header, bundle, a.exercise, exercise))
+        warnings.push_back(warning);
     if (const std::uint64_t seed = attempt_seed(session->header); seed != 0 && !a.bundle.empty()) {
         const CaseAnatomy at_rest(bundle);
         exercise = draw_attempt(exercise, at_rest, bundle.labels, seed).exercise;
@@ -166,8 +168,9 @@ int verb_score(int argc, char** argv) {
     ScoreOptions options;
     ThreadJobs jobs(common.threads);
     options.jobs = &jobs;
-    const SessionScore score =
-        score_session(*session, exercise, anatomy.get(), bundle.labels, options);
+    SessionScore score = score_session(*session, exercise, anatomy.get(), bundle.labels, options);
+    if (!a.bundle.empty())
+        score.warnings.insert(score.warnings.begin(), warnings.begin(), warnings.end());
     const std::string json = score_json(score, exercise);
     if (a.json) {
         std::fputs(json.c_str(), stdout);
@@ -219,6 +222,14 @@ Result<ProgressEntry> kept_entry(const std::string& path) {
     return progress_entry(session.header, score, failed ? recording : whole);
 }
 
+// Spaces up to a column, counted in characters and not in bytes of UTF-8.
+std::string padded(std::string text, std::ptrdiff_t wide) {
+    const auto characters =
+        std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; });
+    text.append(static_cast<std::size_t>(std::max<std::ptrdiff_t>(wide - characters, 0)), ' ');
+    return text;
+}
+
 }  // namespace
 
 int verb_progress(int argc, char** argv) {
@@ -251,12 +262,17 @@ int verb_progress(int argc, char** argv) {
     }
     if (!kept.empty()) return kDone;
     if (!remove.empty()) {
-        std::vector<std::string> left;
-        if (auto s = book->remove_trainee(remove, &left); !s) return fail("progress", s.error());
-        for (const std::string& file : left) {
+        const auto removed = book->remove_trainee(remove);
+        if (!removed) return fail("progress", removed.error());
+        for (const std::string& file : removed->not_deleted) {
             std::fprintf(stderr, "sonocase progress: warning: could not delete %s\n", file.c_str());
         }
+        std::printf("removed %s: sessions %zu, recordings %zu, review pages %zu\n", remove.c_str(),
+                    removed->sessions, removed->recordings, removed->reviews);
         return kDone;
+    }
+    if (!trainee.empty()) {
+        if (auto s = book->expect_trainee(trainee); !s) return fail("progress", s.error());
     }
     if (!csv.empty()) {
         const auto text = book->csv(trainee, exercise);
@@ -275,8 +291,8 @@ int verb_progress(int argc, char** argv) {
         for (const Metric& m : e.metrics) {
             if (m.name == "final_tip_to_target_mm") error = m.value;
         }
-        std::printf("%s  %-20s %-24s %-10s", e.started.c_str(), e.trainee.c_str(),
-                    e.exercise.c_str(), e.passed ? "passed" : "not passed");
+        std::printf("%s  %s %s %-10s", e.started.c_str(), padded(e.trainee, 20).c_str(),
+                    padded(e.exercise, 24).c_str(), e.passed ? "passed" : "not passed");
         if (std::isfinite(error)) std::printf("  tip to target %.1f mm", error);
         std::printf("\n");
     }

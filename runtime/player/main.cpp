@@ -2,9 +2,11 @@
 
 // The program sonoplay: its command line, and the run that it asks for.
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <limits>
 #include <sstream>
 #include <string>
@@ -144,6 +146,34 @@ int wrong_usage(const CLI::App& app, const std::string& what, int argc, char** a
     return 2;
 }
 
+// Whether the recording would replace the file that is replayed, as it would at the first frame.
+bool replaces_replayed(const PlayerArguments& arguments) {
+    constexpr std::string_view kReplay = "replay:";
+    if (!arguments.tracker.starts_with(kReplay)) return false;
+    const std::string files = arguments.tracker.substr(kReplay.size());
+    std::vector<std::string> read = split(files);
+    read.push_back(files);
+    return std::any_of(read.begin(), read.end(), [&](const std::string& file) {
+        std::error_code none;
+        return std::filesystem::equivalent(file, arguments.record, none);
+    });
+}
+
+// What is wrong with --record and --trainee; empty: nothing.
+std::string recording_fault(const PlayerArguments& arguments) {
+    if (arguments.record.empty()) {
+        return arguments.headless && !arguments.trainee.empty()
+                   ? "--trainee keeps the scores of a recording; use it with --record FILE.igs.mha"
+                   : "";
+    }
+    if (!arguments.record.ends_with(".mha"))
+        return "--record " + arguments.record + " does not end in .mha; use e.g. attempt.igs.mha";
+    if (replaces_replayed(arguments))
+        return "--record " + arguments.record +
+               " is the file that --tracker replays; record to another";
+    return "";
+}
+
 }  // namespace
 
 int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exit_now) {
@@ -271,6 +301,11 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
         }
         arguments.width_px = w;
         arguments.height_px = h;
+    }
+    if (const std::string fault = recording_fault(arguments); !fault.empty()) {
+        std::fprintf(stderr, "sonoplay: %s\n", fault.c_str());
+        exit_now = true;
+        return 2;
     }
     arguments.effects = split(effects);
     doppler.take(arguments);

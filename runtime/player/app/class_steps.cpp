@@ -72,12 +72,17 @@ void save_class_file(PlayerState& player, const std::string& kind) {
 
 void remove_from_class(PlayerState& player, const std::string& trainee) {
     auto book = ProgressBook::open(default_progress_path());
-    std::vector<std::string> left;
-    const Status removed = book ? book->remove_trainee(trainee, &left) : Status(book.error());
+    const auto removed =
+        book ? book->remove_trainee(trainee) : Result<RemovedTrainee>(book.error());
     if (!removed) {
         player.notices.error(removed.error().message());
-    } else if (!left.empty()) {
-        player.notices.warning({"{} could not be deleted.", {left.front()}});
+    } else if (!removed->not_deleted.empty()) {
+        player.notices.warning({"{} could not be deleted.", {removed->not_deleted.front()}});
+    } else {
+        player.notices.news(
+            {"Removed: sessions {}, recordings {}, review pages {}.",
+             {std::to_string(removed->sessions), std::to_string(removed->recordings),
+              std::to_string(removed->reviews)}});
     }
     player.progress.class_records.reset();
     sign_in(player, player.progress.trainee == trainee ? "" : player.progress.trainee);

@@ -423,16 +423,16 @@ void draw_tray(
         if (cell < needle) {
             style.key = "N";
             style.tip = "Shift + N puts it across the plane";
-            request.toggle_needle =
-                ui.button("needle", box,
-                          tr(input.mouse->has_needle() ? "Withdraw needle" : "Take needle"), style);
+            // Half a card has no room for "Withdraw needle".
+            request.toggle_needle = ui.button(
+                "needle", box, tr(input.mouse->has_needle() ? "Needle out" : "Take needle"), style);
             continue;
         }
         const int i = cell - needle;
         const TrayAct& act = tray[static_cast<std::size_t>(i)];
         style.enabled = input.live;
         style.may_cut = true;
-        if (i < kTrayKeys) style.tip = tray_key(i);
+        if (i < kTrayKeys) style.key = style.tip = tray_key(i);
         const std::string id = "act" + std::to_string(i);
         if (ui.button(id.c_str(), box, tr(act.words), style)) request.act = act.act;
     }

@@ -2,8 +2,6 @@
 
 #include "runtime/player/words/words.h"
 
-#include "formats/base/clinical_names.h"
-
 namespace sonocase::runtime::inline player_words {
 namespace {
 
@@ -41,14 +39,7 @@ std::string tr_message(const Message& message) {
 }
 
 std::string tissue_words(const std::string& label) {
-    if (language_in_use().catalogue.empty()) return clinical_name(label);
-    const LabelParts parts = label_parts(label);
-    const char* known = translation(parts.words.c_str());
-    if (!known) return clinical_name(label);
-    std::string words = known;
-    if (!parts.side.empty()) words += std::string(" ") + tr(parts.side.c_str());
-    if (!parts.number.empty()) words += " " + parts.number;
-    return words;
+    return language_in_use().tissue_words(label);
 }
 
 }  // namespace sonocase::runtime::inline player_words

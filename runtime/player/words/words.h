@@ -41,8 +41,7 @@ std::string filled(const char* format, const Values&... values) {
 // language in use. Standard error keeps the English.
 std::string tr_message(const Message& message);
 
-// The name of a label as clinicians write it: "kidney_left" is "Left kidney", "Niere links"
-// (formats/base/clinical_names.h). A name that the catalogue lacks stays English.
+// The name of a label or target in the language in use (formats/words/catalogue.h).
 std::string tissue_words(const std::string& label);
 
 }  // namespace sonocase::runtime::inline player_words

@@ -13,6 +13,7 @@
 
 #include "formats/files/atomic_file.h"
 #include "formats/progress_book/progress_book.h"
+#include "formats/recording/session.h"
 #include "support/random.h"
 #include "support/temporary_folder.h"
 
@@ -155,14 +156,79 @@ TEST(ProgressBook, ARemovedTraineeIsGoneWithFilesAndBytes) {
     ASSERT_TRUE(book->add(e));
     ASSERT_TRUE(book->add(entry("Ada", 1)));
     ASSERT_NE(read_text_file(path)->find("Zaphod-Unmistakable"), std::string::npos);
-    std::vector<std::string> left;
-    ASSERT_TRUE(book->remove_trainee("Zaphod-Unmistakable", &left));
-    EXPECT_TRUE(left.empty());
+    const auto removed = book->remove_trainee("Zaphod-Unmistakable");
+    ASSERT_TRUE(removed) << removed.error().message();
+    EXPECT_TRUE(removed->not_deleted.empty());
+    EXPECT_EQ(removed->sessions, 1u);
+    EXPECT_EQ(removed->recordings, 1u);
     EXPECT_FALSE(fs::exists(e.recording));
     EXPECT_FALSE(fs::exists(folder / "z.frames.igs.mha"));
     EXPECT_FALSE(fs::exists(e.recording + ".scores.json"));
     EXPECT_EQ(book->sessions("", "")->size(), 1u);
     EXPECT_EQ(read_text_file(path)->find("Zaphod-Unmistakable"), std::string::npos);
+}
+
+// Attempts under 3 s are recorded and not in the book; the window writes review pages beside them.
+TEST(ProgressBook, ARemovedTraineeLeavesNoRecordingOutsideTheBookAndNoReview) {
+    const TemporaryFolder folder(/*in_memory=*/true);
+    const std::string sessions = folder / "sessions/";
+    auto book = ProgressBook::open(folder / "progress.sqlite");
+    const auto record = [&](const std::string& name, const std::string& trainee) {
+        Session session;
+        session.header.case_name = "demo";
+        session.header.trainee = trainee;
+        session.samples.resize(2);
+        session.samples[1].time_s = 1;
+        const auto bytes = write_sequence(sequence_from_session(session), SequenceForm::mha);
+        EXPECT_TRUE(write_file(sessions + name + ".igs.mha", bytes));
+        EXPECT_TRUE(write_file(sessions + name + ".review/review.html", std::string_view("x")));
+        EXPECT_TRUE(write_file(sessions + name + ".review/scores.json", std::string_view("x")));
+    };
+    record("kept", "Zo\u00eb A.");
+    record("short", "Zo\u00eb A.");
+    record("short.frames", "Zo\u00eb A.");
+    record("lone.frames", "Zo\u00eb A.");
+    record("other", "Zo\u00eb");
+    record("nobody", "");
+    ASSERT_TRUE(write_file(sessions + "short.review/mine.txt", std::string_view("x")));
+    ASSERT_TRUE(write_file(sessions + "text.igs.mha", std::string_view("SonocaseTrainee = Ada\n")));
+    ProgressEntry e = entry("Zo\u00eb A.", 1);
+    e.recording = sessions + "kept.igs.mha";
+    ASSERT_TRUE(book->add(e));
+    ASSERT_TRUE(book->add(entry("Ada", 1)));
+    const auto removed = book->remove_trainee("Zo\u00eb A.");
+    ASSERT_TRUE(removed) << removed.error().message();
+    EXPECT_TRUE(removed->not_deleted.empty());
+    EXPECT_EQ(removed->sessions, 1u);
+    EXPECT_EQ(removed->recordings, 2u);
+    EXPECT_EQ(removed->reviews, 2u);
+    for (const char* gone :
+         {"kept.igs.mha", "kept.review", "short.igs.mha", "short.frames.igs.mha",
+          "short.review/review.html", "short.review/scores.json", "lone.frames.igs.mha"})
+        EXPECT_FALSE(fs::exists(sessions + gone)) << gone;
+    for (const char* stays : {"other.igs.mha", "other.review/review.html", "nobody.igs.mha",
+                              "nobody.review/review.html", "short.review/mine.txt", "text.igs.mha"})
+        EXPECT_TRUE(fs::exists(sessions + stays)) << stays;
+    ASSERT_TRUE(book->remove_trainee("Ada"));
+    EXPECT_TRUE(fs::exists(sessions + "text.igs.mha"));  // no session
+}
+
+TEST(ProgressBook, ATraineeWhoIsNotThereIsNamedWithTheNearest) {
+    const TemporaryFolder folder(/*in_memory=*/true);
+    auto book = ProgressBook::open(folder / "progress.sqlite");
+    ASSERT_TRUE(book->add(entry("Ada Lovelace", 1)));
+    ASSERT_TRUE(book->add(CourseAnswer{"Bob", "a", "b", 1}));
+    EXPECT_TRUE(book->expect_trainee("Ada Lovelace"));
+    EXPECT_TRUE(book->expect_trainee("Bob"));
+    for (const Error& error :
+         {book->expect_trainee("Ada Lovelac").error(), book->remove_trainee("Ada Lovelac").error()})
+        EXPECT_NE(
+            error.message().find("has no trainee 'Ada Lovelac'; did you mean 'Ada Lovelace'?"),
+            std::string::npos)
+            << error.message();
+    EXPECT_FALSE(book->remove_trainee("Xerxes"));
+    EXPECT_FALSE(book->remove_trainee(""));
+    EXPECT_EQ(book->sessions("", "")->size(), 1u);
 }
 
 TEST(ProgressBook, KilledWhileWritingItStaysConsistent) {

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <regex>
 #include <set>
+#include <sstream>
 
 #include "formats/exercise/metric_table.h"
 #include "formats/files/atomic_file.h"
@@ -240,6 +241,44 @@ TEST(Review, IsWrittenInTheLanguageOfItsReader) {
         EXPECT_EQ(page.find(words), std::string::npos) << words;
 }
 
+// As the window does.
+TEST(Review, NamesTheNearestTargetInWordsOfItsLanguage) {
+    Files files;
+    for (const auto& [language, target] : {std::pair("de", ">Herd<"), {"en", ">Lesion<"}}) {
+        ReviewOptions options;
+        options.language = language;
+        auto input = load_review(files.session, files.bundle, options);
+        ASSERT_TRUE(input) << input.error().message();
+        ASSERT_FALSE(input->exercise.targets.empty());
+        input->exercise.targets[0].name = "lesion";
+        input->score.insertions.resize(1);
+        input->score.insertions[0].target = 0;
+        EXPECT_NE(review_page(*input, {}).find(target), std::string::npos) << language;
+    }
+}
+
+TEST(Progress, ColumnsStandUnderEachOtherWhateverTheNames) {
+    const testing::TemporaryFolder folder;
+    const std::string path = folder / "book.sqlite";
+    ProgressEntry entry;
+    entry.started = "2026-01-02T00:00:00Z";
+    entry.exercise = "line";
+    for (const char* name : {"Bjoern", "Bj\u00f6rn", "\u0141ucja \u017b\u00f3\u0142\u0107"}) {
+        entry.trainee = name;
+        ASSERT_TRUE(ProgressBook::open(path)->add(entry));
+    }
+    const auto said = testing::run_command(SONOCASE_BIN "/sonocase progress --progress " + path);
+    ASSERT_EQ(said.status, 0) << said.error;
+    std::set<std::ptrdiff_t> columns;
+    std::istringstream in(said.out);
+    for (std::string line; std::getline(in, line);) {
+        const std::string before = line.substr(0, line.find("line"));
+        columns.insert(
+            std::count_if(before.begin(), before.end(), [](char c) { return (c & 0xC0) != 0x80; }));
+    }
+    EXPECT_EQ(columns.size(), 1u) << said.out;
+}
+
 TEST(Review, ALanguageThatIsNotThereIsWrongUsage) {
     Files files;
     const auto said =
@@ -265,6 +304,23 @@ TEST(Review, AnotherCaseAndAMissingExerciseAreSaid) {
     ASSERT_FALSE(wrong);
     EXPECT_NE(wrong.error().message().find("scan"), std::string::npos);
     EXPECT_FALSE(load_review(files.bundle, files.bundle, {}));
+    options.exercise = "scan";
+    const auto other = load_review(files.session, files.bundle, options);
+    ASSERT_TRUE(other);
+    ASSERT_EQ(other->warnings.size(), 2u);
+    EXPECT_EQ(std::string(other->warnings[0]),
+              "The session was recorded on the case 'another' and not on 'cylinder'.");
+    EXPECT_EQ(std::string(other->warnings[1]),
+              "The session was recorded for the exercise 'gone' and not for 'scan'.");
+    // `sonocase score` says the same.
+    for (const char* form : {"", " --json"}) {
+        const auto said =
+            testing::run_command(SONOCASE_BIN "/sonocase score " + files.session + " --case " +
+                                 files.bundle + " --exercise scan" + form);
+        EXPECT_EQ(said.status, 0) << said.error;
+        for (const Message& warning : other->warnings)
+            EXPECT_NE(said.out.find(std::string(warning)), std::string::npos) << form << said.out;
+    }
     EXPECT_FALSE(load_review(files.session, files.session, {}));
 }
 

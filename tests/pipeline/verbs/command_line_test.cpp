@@ -115,6 +115,18 @@ TEST(CommandLine, FailureIsStatusOneWithOneLineAndNothingWritten) {
     }
 }
 
+TEST(CommandLine, ATraineeWhoIsNotInTheBookIsNamed) {
+    const TemporaryFolder folder;
+    EXPECT_EQ(sonocase_run("progress --progress book.sqlite", folder).status, 0);
+    for (const char* option : {"--trainee", "--remove"}) {
+        const CommandResult result =
+            sonocase_run(std::string("progress --progress book.sqlite ") + option + " Ada", folder);
+        EXPECT_EQ(result.status, 1) << result.error;
+        EXPECT_EQ(lines(result.error), 1) << result.error;
+        EXPECT_NE(result.error.find("has no trainee 'Ada'"), std::string::npos) << result.error;
+    }
+}
+
 // Reading a device may never end, and opening a pipe waits for its writer.
 TEST(CommandLine, DevicesAndPipesAreRefusedAtOnce) {
     const TemporaryFolder folder;

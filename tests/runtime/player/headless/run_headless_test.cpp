@@ -265,6 +265,8 @@ TEST_F(Headless, SaysInOneLineWhatIsWrong) {
         {bundle_ + " --headless --model paper --stats /proc/nothing.json", 1, "/proc/nothing.json"},
         {bundle_ + " --headless --model paper --record /proc/nothing.igs.mha", 1,
          "/proc/nothing.igs.mha"},
+        {bundle_ + " --headless --record x.mp4", 2, "--record x.mp4 does not end in .mha"},
+        {bundle_ + " --headless --trainee Ada", 2, "use it with --record"},
         {bundle_ + " --headless --size huge", 2, "WxH"},
         {bundle_ + " --headless --model cubist", 2, "physical"},
         {bundle_ + " --headless --frames 0", 2, "frames"},
@@ -277,6 +279,25 @@ TEST_F(Headless, SaysInOneLineWhatIsWrong) {
         EXPECT_EQ(std::count(run.error.begin(), run.error.end(), '\n'), 1) << c.arguments << "\n"
                                                                            << run.error;
     }
+}
+
+TEST_F(Headless, DoesNotRecordOverWhatItReplays) {
+    const std::string file = folder_ / "a.igs.mha", link = folder_ / "link.igs.mha";
+    const std::string run = bundle_ + " --headless --model paper --size 64x64 --tracker ";
+    ASSERT_EQ(play(run + "sweep:along --frames 5 --record " + file).status, 0);
+    const std::string before = read_text(file);
+    std::filesystem::create_symlink(file, link);
+    std::filesystem::copy_file(file, folder_ / "b.igs.mha");
+    for (const std::string& tracker :
+         {file, link, folder_.path() + "/./a.igs.mha", (folder_ / "b.igs.mha") + "," + file}) {
+        const CommandResult refused = play(run + "replay:" + tracker + " --record " + file);
+        EXPECT_EQ(refused.status, 2) << tracker;
+        EXPECT_NE(refused.error.find("a.igs.mha is the file that --tracker replays"),
+                  std::string::npos)
+            << refused.error;
+        EXPECT_EQ(read_text(file), before) << tracker;
+    }
+    EXPECT_EQ(play(run + "replay:" + file + " --record " + (folder_ / "b.igs.mha")).status, 0);
 }
 
 TEST(PlayerProgram, LinksNoLibraryOfThePipeline) {

@@ -46,10 +46,10 @@ std::vector<SeenBox> load_boxes(const std::string& file) {
 }
 
 const char* const kPages[] = {
-    "scan",     "attempt",   "frozen", "after",   "replay",   "help",     "tracker", "effects",
-    "cases",    "exercises", "setup",  "colour",  "spectrum", "motion",   "named",   "marks",
-    "settings", "notices",   "class",  "sign_in", "longest",  "question", "asked",   "hinted",
-    "tray",     "checklist", "told",   "course",  "module",   "locked",   "watched"};
+    "scan",     "attempt",   "frozen",    "after",   "replay",   "help",     "tracker", "effects",
+    "cases",    "exercises", "setup",     "colour",  "spectrum", "motion",   "named",   "marks",
+    "settings", "notices",   "class",     "sign_in", "longest",  "question", "asked",   "hinted",
+    "in_hand",  "tray",      "checklist", "told",    "course",   "module",   "locked",  "watched"};
 
 // A procedure with as many acts as the tray has keys, long words, and a question.
 const char* const kProcedure = R"(name = "procedure"
@@ -143,9 +143,10 @@ std::string script(const std::string& folder) {
     return "only-shots\nwait 4\n" + boxes("scan") + "key f5\nwait 4\nkey b\nwait 4\n" +
            boxes("question") + "press later\nwait 2\npress ask\nwait 2\n" + boxes("asked") +
            "press later\nwait 2\nkey h\nwait 3\n" + boxes("hinted") +
-           "key j\nkey k\nkey l\nkey i\nkey i ctrl\nwait 4\n" + boxes("tray") + "key b\nwait 8\n" +
-           boxes("checklist") + "key escape\nkey f5\nwait 4\nkey b\nwait 4\nkey h\nwait 3\n" +
-           boxes("told") + "key b\nwait 8\nkey escape\nkey f5 shift\nwait 4\n" +
+           "key j\nkey k\nkey l\nkey i\nkey i ctrl\nwait 4\n" + boxes("tray") + "key n\nwait 4\n" +
+           boxes("in_hand") + "key n\nwait 2\nkey b\nwait 8\n" + boxes("checklist") +
+           "key escape\nkey f5\nwait 4\nkey b\nwait 4\nkey h\nwait 3\n" + boxes("told") +
+           "key b\nwait 8\nkey escape\nkey f5 shift\nwait 4\n" +
            "key f5 shift\nwait 4\nkey b\nkey n\nhold w 6\nkey h\nwait 2\n" + boxes("attempt") +
            "key space\nwait 2\n" + boxes("frozen") + "key space\nwait 2\nkey b\nwait 3\n" +
            boxes("after") + "key p\nwait 2\n" + boxes("replay") + "key p\nwait 2\nkey escape\n" +
@@ -363,6 +364,9 @@ void Tour::check() {
         }
         if (page == std::string("tray")) {
             EXPECT_TRUE(has("act0") && has("ask") && !has("option0"));
+        }
+        if (page == std::string("in_hand")) {
+            EXPECT_TRUE(has("needle") && has("act0"));
         }
         // Task and hint are whole: check_boxes() would have found them cut.
         const bool english = language == "C";
