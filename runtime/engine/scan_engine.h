@@ -56,7 +56,7 @@ struct ToolPoses {
     double probe_age_s = 0, needle_age_s = 0;
 };
 
-// A sensor that has a pose; null: it is absent or lost, or its pose is not a number.
+// A sensor that has a pose; null: it is absent or lost, or its pose is none (has_pose()).
 const SensorReading* sensor_with_pose(const TrackerReading& reading, int index);
 
 // The pose of a sensor as calibrations mean it: relative to the reference where there is one,

@@ -68,8 +68,7 @@ void SensorWatch::observe(const SensorReading& reading,
                        reading.state == last_.state &&
                        reading.world_from_sensor == last_.world_from_sensor;
     if (again && reading.state != SensorState::absent) return;
-    usable_ = (reading.state == SensorState::ok || reading.state == SensorState::poor) &&
-              is_finite(reading.world_from_sensor);
+    usable_ = has_pose(reading);
     if (!seen_ || !(reading.world_from_sensor == last_.world_from_sensor)) {
         const double rest_s = time_s - changed_s_;
         const double step =

@@ -225,7 +225,7 @@ TEST_F(Engine, ALostToolIsLostInEveryWayOfSayingSo) {
     options_.render.width_px = options_.render.height_px = 16;
     options_.render.scanlines = 8;
     options_.render.samples = 16;
-    enum Way { silent, said, not_a_number, at_identity, repeated, kWays };
+    enum Way { silent, said, not_a_number, missing_number, at_identity, repeated, kWays };
     sonocase::testing::Random random(43);
     constexpr double kStep = 1 / 30.0;
     for (int way = 0; way < kWays; ++way) {
@@ -268,6 +268,8 @@ TEST_F(Engine, ALostToolIsLostInEveryWayOfSayingSo) {
                 needle.world_from_sensor = noisy({0, 0, 0});
             } else if (way == not_a_number) {
                 needle.world_from_sensor.translation.x = NAN;
+            } else if (way == missing_number) {
+                needle.world_from_sensor.translation = -3.697314e28 * Vector3{1, 1, 1};
             } else if (way == at_identity) {
                 needle.world_from_sensor = {};
             }
@@ -330,13 +332,18 @@ TEST_F(Engine, APoseThatIsNoNumberIsLostAndThePictureStays) {
     engine->observe(reading(0), true);
     engine->frame(0, {}, good);
     std::vector<std::uint8_t> held = good;
-    TrackerReading bad = reading(0);
-    bad.sensors[0].world_from_sensor.translation.x = NAN;
-    engine->observe(bad, true);
-    const Rigid before = engine->last().input.mannequin_from_probe;
-    engine->frame(0.1, {}, held);
-    EXPECT_EQ(engine->last().input.mannequin_from_probe, before);
-    EXPECT_FALSE(engine->last().tools.has_probe);
+    // Of a device and of a recording.
+    for (const auto& [number, is_device] :
+         {std::pair(NAN, true), {-3.697314e28, true}, {-3.697314e28, false}}) {
+        TrackerReading bad = reading(0);
+        bad.in_mannequin = true;
+        bad.sensors[0].world_from_sensor.translation.x = number;
+        engine->observe(bad, is_device);
+        const Rigid before = engine->last().input.mannequin_from_probe;
+        engine->frame(bad.time_s, {}, held);
+        EXPECT_EQ(engine->last().input.mannequin_from_probe, before);
+        EXPECT_FALSE(engine->last().tools.has_probe);
+    }
 }
 
 TEST_F(Engine, DarkensWithoutContact) {

@@ -56,6 +56,22 @@ TEST(SensorWatch, BelievesANewPlaceThatIsConfirmed) {
     EXPECT_EQ(watch.verdict(2), SensorVerdict::stale);  // and nothing more came
 }
 
+// NDI's number for a tool that is missing comes again and again, and confirms nothing.
+TEST(SensorWatch, ANumberThatNoTrackerMeasuresIsLost) {
+    for (const double missing : {-3.697314e28, 1e10, -1e6}) {
+        SensorWatch watch;
+        for (int i = 0; i < 10; ++i) watch.observe(at(0.01 * i), i / 60.0, true);
+        for (int i = 10; i < 20; ++i) {
+            watch.observe(at(missing), i / 60.0, true);
+            EXPECT_TRUE(watch.lost(i / 60.0)) << missing;
+            EXPECT_EQ(watch.verdict(i / 60.0), SensorVerdict::lost);
+        }
+        watch.observe(at(0.2), 20 / 60.0, true);
+        EXPECT_FALSE(watch.lost(20 / 60.0) || watch.hold());
+        EXPECT_EQ(watch.jumps(), 0);
+    }
+}
+
 TEST(SensorWatch, TellsLostFromStale) {
     SensorWatch watch;
     EXPECT_EQ(watch.verdict(0), SensorVerdict::absent);
