@@ -111,8 +111,8 @@ class ScanEngine {
 
     // Takes a new reading; the next frame shows it. A tool is lost, in the picture, the recording
     // and the scores, once its own sensor has no pose to be believed (SensorWatch::lost), whatever
-    // the others say, and both are with the reference; so is one at exactly the identity among
-    // others, which senders give for none.
+    // the others say, and both are with the reference; so is one of a device at exactly 0, 0, 0,
+    // which senders give for none.
     void observe(const TrackerReading& reading, bool is_device);
     // After a reading that restarts: takes the procedure through the samples that a recording or a
     // script holds before it, so that state, list and moments are those of playing it. Renders

@@ -225,7 +225,16 @@ TEST_F(Engine, ALostToolIsLostInEveryWayOfSayingSo) {
     options_.render.width_px = options_.render.height_px = 16;
     options_.render.scanlines = 8;
     options_.render.samples = 16;
-    enum Way { silent, said, not_a_number, missing_number, at_identity, repeated, kWays };
+    enum Way {
+        silent,
+        said,
+        not_a_number,
+        missing_number,
+        at_identity,
+        at_origin,
+        repeated,
+        kWays
+    };
     sonocase::testing::Random random(43);
     constexpr double kStep = 1 / 30.0;
     for (int way = 0; way < kWays; ++way) {
@@ -272,6 +281,8 @@ TEST_F(Engine, ALostToolIsLostInEveryWayOfSayingSo) {
                 needle.world_from_sensor.translation = -3.697314e28 * Vector3{1, 1, 1};
             } else if (way == at_identity) {
                 needle.world_from_sensor = {};
+            } else if (way == at_origin) {
+                needle.world_from_sensor.translation = {};
             }
             engine->observe(reading, true);
             engine->frame(t, {}, pixels);
@@ -302,6 +313,31 @@ TEST_F(Engine, ALostToolIsLostInEveryWayOfSayingSo) {
             const ToolTrack track = track_of(session, Tool::needle);
             // A frame's time, and that of one that was held back until a second confirmed it.
             EXPECT_NEAR(track.longest_gap_s, to - from, 0.05) << way << " drop " << drop;
+        }
+    }
+}
+
+// A sender that sees neither tool from its start on sends identities; a mouse or a recording may
+// well put a tool at the origin.
+TEST_F(Engine, ToolsOfADeviceAtTheOriginAreLostFromTheStart) {
+    for (const bool is_device : {true, false}) {
+        auto engine = ScanEngine::create(bundle_, exercise_, options_);
+        ASSERT_TRUE(engine);
+        std::vector<std::uint8_t> pixels(96 * 96);
+        for (int i = 0; i < 10; ++i) {
+            TrackerReading r = reading(0);
+            r.in_mannequin = !is_device;
+            r.sensor_count = 2;
+            for (const int s : {0, 1}) {
+                r.sensors[s].state = SensorState::ok;
+                r.sensors[s].world_from_sensor = {};
+            }
+            engine->observe(r, is_device);
+            engine->frame(r.time_s, {}, pixels);
+            EXPECT_NE(engine->last().tools.has_probe, is_device);
+            EXPECT_NE(engine->last().tools.has_needle, is_device);
+            EXPECT_EQ(engine->probe_verdict(r.time_s),
+                      is_device ? SensorVerdict::lost : SensorVerdict::fine);
         }
     }
 }
