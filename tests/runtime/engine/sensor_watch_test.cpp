@@ -72,6 +72,25 @@ TEST(SensorWatch, ANumberThatNoTrackerMeasuresIsLost) {
     }
 }
 
+// Of a tool that it has lost, a sender gives the same default pose again and again.
+TEST(SensorWatch, ADefaultPoseThatIsRepeatedConfirmsNothing) {
+    SensorWatch watch;
+    const auto noisy = [](int i) { return at(10 + 0.01 * (i % 7)); };
+    int i = 0;
+    for (; i < 60; ++i) watch.observe(noisy(i), i / 60.0, true, true);
+    for (; i < 120; ++i) {
+        watch.observe(at(400), i / 60.0, true, true);
+        EXPECT_TRUE(watch.hold() || watch.lost(i / 60.0)) << i;
+    }
+    EXPECT_EQ(watch.verdict(i / 60.0), SensorVerdict::lost);
+    // Nothing of it is shown when the tool is seen again.
+    watch.observe(noisy(i), i / 60.0, true, true);
+    EXPECT_FALSE(watch.hold() || watch.lost(i / 60.0));
+    // Where nothing else moves, half a second of equal readings is a place.
+    for (++i; i < 200; ++i) watch.observe(at(400), i / 60.0, true, false);
+    EXPECT_FALSE(watch.hold());
+}
+
 TEST(SensorWatch, TellsLostFromStale) {
     SensorWatch watch;
     EXPECT_EQ(watch.verdict(0), SensorVerdict::absent);
