@@ -90,6 +90,8 @@ NamedPose quaternion_at(std::span<const std::uint8_t> b, std::size_t at, std::si
         pose.fault = PoseFault::not_finite;
     } else if (is_missing(t)) {
         pose.fault = PoseFault::lost;
+    } else if (parts == 0) {
+        pose.fault = PoseFault::unturned;
     } else if (!(std::abs(length - 1) < 0.05)) {
         pose.fault = PoseFault::scaled;
     } else {

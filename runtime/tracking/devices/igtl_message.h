@@ -47,6 +47,7 @@ enum class PoseFault : std::uint8_t {
     not_finite,  // NaN or infinite
     scaled,      // no rigid motion: mm per pixel in its columns, or all zeros
     mirrored,    // left-handed
+    unturned,    // a place without an orientation: POSITION of 12 bytes
 };
 struct NamedPose {
     std::string name;
