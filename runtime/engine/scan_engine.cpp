@@ -15,17 +15,10 @@ bool is_pose(const SensorReading& s) {
     return s.state == SensorState::ok || s.state == SensorState::poor;
 }
 
-// True if sensor `index` gives exactly the identity though it, or another, has been elsewhere.
-bool at_identity(const TrackerReading& reading, const TrackerReading& before, int index) {
-    const SensorReading &now = reading.sensors[index], &was = before.sensors[index];
-    if (!is_pose(now) || !(now.world_from_sensor == Rigid{})) return false;
-    if (was.state == SensorState::lost || (is_pose(was) && !(was.world_from_sensor == Rigid{})))
-        return true;
-    for (int i = 0; i < std::min(reading.sensor_count, kMaxSensors); ++i) {
-        if (is_pose(reading.sensors[i]) && !(reading.sensors[i].world_from_sensor == Rigid{}))
-            return true;
-    }
-    return false;
+// True for a place of exactly 0, 0, 0, which no sensor measures: senders give it, turned or not,
+// for a tool that they do not see.
+bool at_origin(const SensorReading& s) {
+    return is_pose(s) && s.world_from_sensor.translation == Vector3{};
 }
 
 // True if a sensor other than `index` has another pose than in the reading before.
@@ -73,7 +66,7 @@ void ScanEngine::observe(const TrackerReading& given, bool is_device) {
     const auto feed = [&](SensorWatch& watch, int index) {
         const bool present = index >= 0 && index < reading.sensor_count && index < kMaxSensors;
         if (!present) return watch.observe({}, reading.time_s, is_device);
-        if (is_device && at_identity(reading, reading_, index))
+        if (is_device && at_origin(reading.sensors[index]))
             reading.sensors[index].state = SensorState::lost;
         watch.observe(reading.sensors[index], reading.time_s, is_device,
                       another_moved(reading, reading_, index));

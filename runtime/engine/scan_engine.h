@@ -56,7 +56,7 @@ struct ToolPoses {
     double probe_age_s = 0, needle_age_s = 0;
 };
 
-// A sensor that has a pose; null: it is absent or lost, or its pose is not a number.
+// A sensor that has a pose; null: it is absent or lost, or its pose is none (has_pose()).
 const SensorReading* sensor_with_pose(const TrackerReading& reading, int index);
 
 // The pose of a sensor as calibrations mean it: relative to the reference where there is one,
@@ -112,8 +112,8 @@ class ScanEngine {
 
     // Takes a new reading; the next frame shows it. A tool is lost, in the picture, the recording
     // and the scores, once its own sensor has no pose to be believed (SensorWatch::lost), whatever
-    // the others say, and both are with the reference; so is one at exactly the identity among
-    // others, which senders give for none.
+    // the others say, and both are with the reference; so is one of a device at exactly 0, 0, 0,
+    // which senders give for none.
     void observe(const TrackerReading& reading, bool is_device);
     void begin_procedure();  // as if nothing had been done yet
     // After a reading that restarts: takes the procedure through the samples that a recording or a

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace sonocase::runtime::inline engine {
 
@@ -68,8 +69,7 @@ void SensorWatch::observe(const SensorReading& reading,
                        reading.state == last_.state &&
                        reading.world_from_sensor == last_.world_from_sensor;
     if (again && reading.state != SensorState::absent) return;
-    usable_ = (reading.state == SensorState::ok || reading.state == SensorState::poor) &&
-              is_finite(reading.world_from_sensor);
+    usable_ = has_pose(reading);
     if (!seen_ || !(reading.world_from_sensor == last_.world_from_sensor)) {
         const double rest_s = time_s - changed_s_;
         const double step =
@@ -86,7 +86,7 @@ void SensorWatch::observe(const SensorReading& reading,
     if (device_ && noisy_ >= options_.noisy_readings && others_ >= options_.repeated_readings &&
         time_s - changed_s_ >= options_.repeated_after_s)
         repeated_ = true;
-    hold_ = false;
+    const bool held = std::exchange(hold_, false);
     if (usable_) {
         if (!seen_ || trusted_s_ < 0) {
             trusted_ = reading.world_from_sensor;
@@ -101,7 +101,14 @@ void SensorWatch::observe(const SensorReading& reading,
             const bool far = moved > reach(time_s - trusted_s_);
             const bool confirmed =
                 last_.state != SensorState::lost && since_last <= reach(time_s - last_s_);
-            if (far && !confirmed) {
+            // A sensor with noise gives no place twice, a sender's default pose is always the same.
+            // What stays equal is believed once it is known not to be repeated.
+            const bool by_default = held && reading.world_from_sensor == last_.world_from_sensor &&
+                                    noisy_ >= options_.noisy_readings && rests_ <= 0 &&
+                                    (repeated_ || time_s - changed_s_ < options_.frozen_after_s);
+            if (by_default) {
+                hold_ = true;
+            } else if (far && !confirmed) {
                 hold_ = device_;
                 if (device_) ++jumps_, jump_s_ = time_s;
             } else {

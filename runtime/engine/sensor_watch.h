@@ -74,12 +74,13 @@ class SensorWatch {
                  bool others_moved = false);
     SensorVerdict verdict(double now_s) const;
     // True if the sensor has no pose that can be believed now: its device says so, it is not a
-    // number, it has been silent, or its sender repeats what it once was.
+    // number or beyond kFarthestMm, it has been silent, or its sender repeats what it once was.
     bool lost(double now_s) const;
     // Of the pose last believed. 0 for what is no device: its poses are of the moment they are for.
     double age_s(double now_s) const { return device_ && fresh_s_ >= 0 ? now_s - fresh_s_ : 0; }
     // True if the last observed pose should not be shown: a jump that no second reading has
-    // confirmed yet. Two readings that agree are believed.
+    // confirmed yet. Two readings that agree are believed; of a sensor with noise, two that are
+    // equal to the last bit are not, because senders repeat a default pose so.
     bool hold() const { return hold_; }
     int jumps() const { return jumps_; }
 

@@ -8,8 +8,7 @@ namespace sonocase::runtime::inline engine {
 const SensorReading* sensor_with_pose(const TrackerReading& reading, int index) {
     if (index < 0 || index >= reading.sensor_count || index >= kMaxSensors) return nullptr;
     const SensorReading& s = reading.sensors[index];
-    const bool ok = s.state == SensorState::ok || s.state == SensorState::poor;
-    return ok && is_finite(s.world_from_sensor) ? &s : nullptr;
+    return has_pose(s) ? &s : nullptr;
 }
 
 SensorAssignment places_of(const TrackerReading& reading, const SensorAssignment& assignment) {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 #include "formats/base/geometry.h"
@@ -25,6 +26,9 @@ enum class SensorState : std::uint8_t {
     lost,  // the device has no pose; the one given is the last good one
 };
 
+// Beyond what any tracker measures: some senders give a huge number for a tool they do not see.
+inline constexpr double kFarthestMm = 1e6;
+
 struct SensorReading {
     SensorState state = SensorState::absent;
     Rigid world_from_sensor;
@@ -36,6 +40,14 @@ struct SensorReading {
     bool in_mannequin = false;  // as TrackerReading's, of this sensor alone
     bool in_reference = false;  // the pose is relative to the reference sensor already
 };
+
+// True if the sensor gives a pose that something measured.
+inline bool has_pose(const SensorReading& s) {
+    const Vector3& at = s.world_from_sensor.translation;
+    return (s.state == SensorState::ok || s.state == SensorState::poor) &&
+           is_finite(s.world_from_sensor) && std::abs(at.x) < kFarthestMm &&
+           std::abs(at.y) < kFarthestMm && std::abs(at.z) < kFarthestMm;
+}
 
 // All sensors at one moment.
 struct TrackerReading {

@@ -407,9 +407,12 @@ Status HeadlessRun::wait_for_reading() {
             // A sentence that was said as a warning names the cure itself.
             const bool explained = !health.message.empty() && health.message.format() == said_ &&
                                    health.phase != TrackerPhase::failed;
-            return Error{
-                health.message.empty() ? "no reading came" : health.message, "tracker " + spec_,
-                explained && heard_cause_ ? "" : "check the device, or use --tracker mouse"};
+            const std::string where = "tracker " + spec_;
+            if (health.message.empty())
+                return Error{"no reading came", where, "check the device, or use --tracker mouse"};
+            if (explained && heard_cause_) return Error{health.message, where, ""};
+            return Error{Message("{} Check the device, or use --tracker mouse.", {health.message}),
+                         where, ""};
         }
         say_health();
         reading_arrived_.wait(0.05);

@@ -7,6 +7,8 @@
 #include <bit>
 #include <cmath>
 
+#include "runtime/engine/tracker_reading.h"
+
 namespace sonocase::runtime::igtl {
 namespace {
 
@@ -42,6 +44,11 @@ std::string text_of(std::span<const std::uint8_t> b, std::size_t at, std::size_t
     return text;
 }
 
+// NDI's number for a tool that is missing, -3.7e28, and others that no tracker measures.
+bool is_missing(const Rigid& t) {
+    return norm(t.translation) >= kFarthestMm;
+}
+
 // Twelve floats, column by column.
 NamedPose matrix_at(std::span<const std::uint8_t> b, std::size_t at) {
     NamedPose pose;
@@ -54,6 +61,8 @@ NamedPose matrix_at(std::span<const std::uint8_t> b, std::size_t at) {
     }
     if (!is_finite(t)) {
         pose.fault = PoseFault::not_finite;
+    } else if (is_missing(t)) {
+        pose.fault = PoseFault::lost;
     } else if (!(determinant(t.rotation) >= 0)) {
         pose.fault = PoseFault::mirrored;
     } else if (!(orthonormality_error(t.rotation) < 1e-2)) {
@@ -79,6 +88,10 @@ NamedPose quaternion_at(std::span<const std::uint8_t> b, std::size_t at, std::si
     const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     if (!is_finite(t) || !std::isfinite(length)) {
         pose.fault = PoseFault::not_finite;
+    } else if (is_missing(t)) {
+        pose.fault = PoseFault::lost;
+    } else if (parts == 0) {
+        pose.fault = PoseFault::unturned;
     } else if (!(std::abs(length - 1) < 0.05)) {
         pose.fault = PoseFault::scaled;
     } else {

@@ -41,10 +41,13 @@ std::optional<Header> parse_header(std::span<const std::uint8_t> bytes);
 // Why a pose is none.
 enum class PoseFault : std::uint8_t {
     none,
-    lost,        // the sender says so: metadata of versions 2 and 3, ...Status = INVALID, MISSING
+    // The sender says so: metadata of versions 2 and 3, ...Status = INVALID, MISSING; or a place
+    // beyond kFarthestMm.
+    lost,
     not_finite,  // NaN or infinite
     scaled,      // no rigid motion: mm per pixel in its columns, or all zeros
     mirrored,    // left-handed
+    unturned,    // a place without an orientation: POSITION of 12 bytes
 };
 struct NamedPose {
     std::string name;

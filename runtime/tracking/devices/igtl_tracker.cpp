@@ -217,6 +217,8 @@ Socket IgtlTracker::converse(Socket socket) {
                         ++heard_.others;
                         heard_.other_type = reader.header().type;
                         if (!reader.body().empty() && reader.header().type != "SENSOR") {
+                            ++heard_.wrong_length;
+                            heard_.wrong_type = reader.header().type;
                             const std::lock_guard lock(mutex_);
                             ++health_.bad_frames;
                         }
@@ -256,13 +258,25 @@ Message IgtlTracker::what_came(double now_s) const {
             "A second program connected and was refused, because one sends already; send all tools "
             "through one, or end the other."};
     if (heard_.poses[kProbeSensor] > 0) {
+        const std::string &probe = names_[kProbeSensor], &needle = names_[kNeedleSensor];
+        if (heard_.farthest_mm == 0)
+            return {
+                "{} comes, always at 0, 0, 0, which stands for out of view: bring the probe to "
+                "where the tracker sees it.",
+                {probe}};
+        // The probe is placed by it.
+        if (relative_to_reference() && !to_mannequin(probe) && !ends_in_reference(probe) &&
+            reading_.sensors[kReferenceSensor].state == SensorState::absent)
+            return {
+                "{} comes and not its reference; send the reference as well, or name another with "
+                "--tool reference=NAME.",
+                {probe}};
         // No tracker measures a probe that long so near to its own origin.
         if (heard_.poses[kProbeSensor] > 60 && heard_.farthest_mm < kNearMm)
             return {
                 "No place of {} lies farther than 10 mm from the origin: these look like "
                 "metres; send millimetres.",
-                {names_[kProbeSensor]}};
-        const std::string &probe = names_[kProbeSensor], &needle = names_[kNeedleSensor];
+                {probe}};
         if (!to_mannequin(probe) && !to_mannequin(needle) && in_two_frames(probe, needle) &&
             !relative_to_reference())
             return {
@@ -287,6 +301,16 @@ Message IgtlTracker::what_came(double now_s) const {
             "{} has a scale, so that it is no pose; send the probe's own transform, such as "
             "ProbeToReference.",
             {heard_.scaled_name}};
+    if (heard_.unturned > 0)
+        return {
+            "{} is a POSITION without an orientation; send TRANSFORM, or POSITION with a "
+            "quaternion.",
+            {heard_.unturned_name}};
+    if (heard_.lost > 0)
+        return {
+            "{} comes, and each time the sender says that it has no pose: bring the probe to where "
+            "the tracker sees it.",
+            {heard_.lost_name}};
     std::size_t most = 0;
     for (std::size_t i = 2; i < heard_.poses.size(); ++i) {
         if (heard_.poses[i] > heard_.poses[most]) most = i;
@@ -300,6 +324,10 @@ Message IgtlTracker::what_came(double now_s) const {
             return {
                 "{} is the inverse of a tool's pose; send the tool's own, such as ProbeToTracker.",
                 {names_[most]}};
+        const std::string ends(name.to);
+        if (rank_as_tool(ends, ToolRole::probe) > 0 || rank_as_tool(ends, ToolRole::needle) > 0)
+            return {"{} is a calibration and no pose; send the tool's own, such as ProbeToTracker.",
+                    {names_[most]}};
     }
     if (most > 0)
         return {
@@ -316,6 +344,9 @@ Message IgtlTracker::what_came(double now_s) const {
     if (reading_.sensors[kReferenceSensor].state != SensorState::absent && relative_to_reference())
         return "The reference's pose comes and none of the probe; send ProbeTo..., TransducerTo... "
                "or ImageTo... as well.";
+    if (heard_.wrong_length > 0)
+        return {"{} messages of type {} came with a wrong length; check the sender.",
+                {count(heard_.wrong_length), heard_.wrong_type}};
     if (heard_.others > 0)
         return {
             "{} messages came, none with a pose; the last is of type {}. Send TRANSFORM or "
@@ -418,7 +449,16 @@ void IgtlTracker::note(const igtl::NamedPose& pose) {
             heard_.mirrored_name = pose.name;
             break;
         case igtl::PoseFault::not_finite: ++heard_.not_finite; break;
+        case igtl::PoseFault::unturned:
+            ++heard_.unturned;
+            heard_.unturned_name = pose.name;
+            break;
         case igtl::PoseFault::lost:
+            if (plays("probe", pose.name)) {
+                ++heard_.lost;
+                heard_.lost_name = pose.name;
+            }
+            return;
         case igtl::PoseFault::none: return;
     }
     const std::lock_guard lock(mutex_);

@@ -84,8 +84,9 @@ class IgtlTracker final : public Tracker {
     // What came on this connection, for the sentence that says why there is no pose.
     struct Heard {
         double since_s = 0, explained_s = 0, asked_s = 0;
-        std::uint64_t wrong_checksum = 0, scaled = 0, mirrored = 0, not_finite = 0, others = 0;
-        std::string scaled_name, mirrored_name, other_type;
+        std::uint64_t wrong_checksum = 0, scaled = 0, mirrored = 0, not_finite = 0, others = 0,
+                      lost = 0, unturned = 0, wrong_length = 0;
+        std::string scaled_name, mirrored_name, lost_name, unturned_name, other_type, wrong_type;
         std::array<std::uint64_t, kMaxSensors> poses{};
         double farthest_mm = 0;  // place of the probe
         double probe_s = -1;     // when the probe's last pose came

@@ -225,7 +225,16 @@ TEST_F(Engine, ALostToolIsLostInEveryWayOfSayingSo) {
     options_.render.width_px = options_.render.height_px = 16;
     options_.render.scanlines = 8;
     options_.render.samples = 16;
-    enum Way { silent, said, not_a_number, at_identity, repeated, kWays };
+    enum Way {
+        silent,
+        said,
+        not_a_number,
+        missing_number,
+        at_identity,
+        at_origin,
+        repeated,
+        kWays
+    };
     sonocase::testing::Random random(43);
     constexpr double kStep = 1 / 30.0;
     for (int way = 0; way < kWays; ++way) {
@@ -268,8 +277,12 @@ TEST_F(Engine, ALostToolIsLostInEveryWayOfSayingSo) {
                 needle.world_from_sensor = noisy({0, 0, 0});
             } else if (way == not_a_number) {
                 needle.world_from_sensor.translation.x = NAN;
+            } else if (way == missing_number) {
+                needle.world_from_sensor.translation = -3.697314e28 * Vector3{1, 1, 1};
             } else if (way == at_identity) {
                 needle.world_from_sensor = {};
+            } else if (way == at_origin) {
+                needle.world_from_sensor.translation = {};
             }
             engine->observe(reading, true);
             engine->frame(t, {}, pixels);
@@ -304,6 +317,31 @@ TEST_F(Engine, ALostToolIsLostInEveryWayOfSayingSo) {
     }
 }
 
+// A sender that sees neither tool from its start on sends identities; a mouse or a recording may
+// well put a tool at the origin.
+TEST_F(Engine, ToolsOfADeviceAtTheOriginAreLostFromTheStart) {
+    for (const bool is_device : {true, false}) {
+        auto engine = ScanEngine::create(bundle_, exercise_, options_);
+        ASSERT_TRUE(engine);
+        std::vector<std::uint8_t> pixels(96 * 96);
+        for (int i = 0; i < 10; ++i) {
+            TrackerReading r = reading(0);
+            r.in_mannequin = !is_device;
+            r.sensor_count = 2;
+            for (const int s : {0, 1}) {
+                r.sensors[s].state = SensorState::ok;
+                r.sensors[s].world_from_sensor = {};
+            }
+            engine->observe(r, is_device);
+            engine->frame(r.time_s, {}, pixels);
+            EXPECT_NE(engine->last().tools.has_probe, is_device);
+            EXPECT_NE(engine->last().tools.has_needle, is_device);
+            EXPECT_EQ(engine->probe_verdict(r.time_s),
+                      is_device ? SensorVerdict::lost : SensorVerdict::fine);
+        }
+    }
+}
+
 // A simulated sender may hold still to the last bit, and goes on from there.
 TEST_F(Engine, WhatRestsToTheLastBitAndGoesOnFromThereIsNoSensor) {
     auto engine = ScanEngine::create(bundle_, exercise_, options_);
@@ -330,13 +368,18 @@ TEST_F(Engine, APoseThatIsNoNumberIsLostAndThePictureStays) {
     engine->observe(reading(0), true);
     engine->frame(0, {}, good);
     std::vector<std::uint8_t> held = good;
-    TrackerReading bad = reading(0);
-    bad.sensors[0].world_from_sensor.translation.x = NAN;
-    engine->observe(bad, true);
-    const Rigid before = engine->last().input.mannequin_from_probe;
-    engine->frame(0.1, {}, held);
-    EXPECT_EQ(engine->last().input.mannequin_from_probe, before);
-    EXPECT_FALSE(engine->last().tools.has_probe);
+    // Of a device and of a recording.
+    for (const auto& [number, is_device] :
+         {std::pair(NAN, true), {-3.697314e28, true}, {-3.697314e28, false}}) {
+        TrackerReading bad = reading(0);
+        bad.in_mannequin = true;
+        bad.sensors[0].world_from_sensor.translation.x = number;
+        engine->observe(bad, is_device);
+        const Rigid before = engine->last().input.mannequin_from_probe;
+        engine->frame(bad.time_s, {}, held);
+        EXPECT_EQ(engine->last().input.mannequin_from_probe, before);
+        EXPECT_FALSE(engine->last().tools.has_probe);
+    }
 }
 
 TEST_F(Engine, DarkensWithoutContact) {

@@ -56,6 +56,41 @@ TEST(SensorWatch, BelievesANewPlaceThatIsConfirmed) {
     EXPECT_EQ(watch.verdict(2), SensorVerdict::stale);  // and nothing more came
 }
 
+// NDI's number for a tool that is missing comes again and again, and confirms nothing.
+TEST(SensorWatch, ANumberThatNoTrackerMeasuresIsLost) {
+    for (const double missing : {-3.697314e28, 1e10, -1e6}) {
+        SensorWatch watch;
+        for (int i = 0; i < 10; ++i) watch.observe(at(0.01 * i), i / 60.0, true);
+        for (int i = 10; i < 20; ++i) {
+            watch.observe(at(missing), i / 60.0, true);
+            EXPECT_TRUE(watch.lost(i / 60.0)) << missing;
+            EXPECT_EQ(watch.verdict(i / 60.0), SensorVerdict::lost);
+        }
+        watch.observe(at(0.2), 20 / 60.0, true);
+        EXPECT_FALSE(watch.lost(20 / 60.0) || watch.hold());
+        EXPECT_EQ(watch.jumps(), 0);
+    }
+}
+
+// Of a tool that it has lost, a sender gives the same default pose again and again.
+TEST(SensorWatch, ADefaultPoseThatIsRepeatedConfirmsNothing) {
+    SensorWatch watch;
+    const auto noisy = [](int i) { return at(10 + 0.01 * (i % 7)); };
+    int i = 0;
+    for (; i < 60; ++i) watch.observe(noisy(i), i / 60.0, true, true);
+    for (; i < 120; ++i) {
+        watch.observe(at(400), i / 60.0, true, true);
+        EXPECT_TRUE(watch.hold() || watch.lost(i / 60.0)) << i;
+    }
+    EXPECT_EQ(watch.verdict(i / 60.0), SensorVerdict::lost);
+    // Nothing of it is shown when the tool is seen again.
+    watch.observe(noisy(i), i / 60.0, true, true);
+    EXPECT_FALSE(watch.hold() || watch.lost(i / 60.0));
+    // Where nothing else moves, half a second of equal readings is a place.
+    for (++i; i < 200; ++i) watch.observe(at(400), i / 60.0, true, false);
+    EXPECT_FALSE(watch.hold());
+}
+
 TEST(SensorWatch, TellsLostFromStale) {
     SensorWatch watch;
     EXPECT_EQ(watch.verdict(0), SensorVerdict::absent);

@@ -119,6 +119,13 @@ TEST(IgtlMessage, FaultsOfAMatrixAreTold) {
     EXPECT_EQ(fault_of(zero), igtl::PoseFault::scaled);
     EXPECT_EQ(fault_of(mirrored), igtl::PoseFault::mirrored);
     EXPECT_EQ(fault_of(no_number), igtl::PoseFault::not_finite);
+    const Bytes missing = igtl::encode_transform("ProbeToTracker", 1, {{}, {-3.697314e28, 0, 0}});
+    igtl::MessageReader reader;
+    reader.add(missing);
+    ASSERT_EQ(reader.next(), igtl::MessageReader::Event::message);
+    const auto poses = igtl::parse_poses(reader.header(), reader.body());
+    ASSERT_EQ(poses.size(), 1u);
+    EXPECT_EQ(poses[0].fault, igtl::PoseFault::lost);
 }
 
 TEST(IgtlMessage, ForceComesBackAndNonsenseDoesNot) {

@@ -173,6 +173,11 @@ TEST(IgtlTracker, SaysWhyNoPoseComes) {
         {igtl::encode_transform("MarkerToReference", 1, {}), "--tool probe=MarkerToReference"},
         {igtl::encode_transform("TrackerToProbe", 1, {}), "inverse of a tool's pose"},
         {igtl::encode_transform("ProbeToTracker", 1, metres), "metres"},
+        {igtl::encode_transform("ProbeToTracker", 1, {}), "always at 0, 0, 0"},
+        {igtl::encode_transform("ProbeToTracker", 1, {{}, {-3.7e28, 0, 0}}), "it has no pose"},
+        {igtl::encode_transform("ImageToProbe", 1, {}), "a calibration and no pose"},
+        {igtl::encode("POSITION", "ProbeToTracker", 1, Bytes(12, 0)), "without an orientation"},
+        {igtl::encode("TRANSFORM", "ProbeToTracker", 1, Bytes(40, 0)), "wrong length"},
         {igtl::encode("STATUS", "S", 1, Bytes(31, 7)), "none with a pose"}};
     for (const auto& [message, sentence] : cases) {
         Result<Socket> server = Socket::listen("127.0.0.1", 0);
@@ -615,6 +620,29 @@ TEST(IgtlTracker, ASecondProgramIsRefusedWithAWordOrTakesOver) {
         send(*third, 3);
         return x_is(3);
     }));
+}
+
+TEST(IgtlTracker, SaysThatTheReferenceDoesNotCome) {
+    Result<Socket> server = Socket::listen("127.0.0.1", 0);
+    ASSERT_TRUE(server);
+    IgtlTrackerOptions options;
+    options.port = server->port();
+    options.explain_s = 0.1;
+    options.tools = {{"reference", "Foo"}};
+    auto started = IgtlTracker::start(options, clock_from_now());
+    ASSERT_TRUE(started);
+    NotifyingTracker tracker(std::move(*started));
+    Socket client = server->accept(15);
+    ASSERT_TRUE(client.open());
+    EXPECT_TRUE(tracker.eventually([&] {
+        client.write(igtl::encode_transform("TransducerToTracker", 1, {{}, {1, 2, 300}}));
+        return tracker->health().message.find("not its reference") != std::string::npos;
+    })) << tracker->health().message;
+    EXPECT_TRUE(tracker.eventually([&] {
+        client.write(igtl::encode_transform("Foo", 1, {{}, {1, 2, 300}}));
+        client.write(igtl::encode_transform("TransducerToTracker", 1, {{}, {1, 2, 300}}));
+        return tracker->health().message.empty();
+    })) << tracker->health().message;
 }
 
 TEST(IgtlTracker, NamesAFrameOfItsOwnAndASlowSender) {
