@@ -111,7 +111,7 @@ Status take_recipe(int argc, char** argv, RegisterArguments& a) {
 void add_register_options(CLI::App& app, RegisterArguments& a, bool several) {
     RecipeInputs& in = a.recipe.inputs;
     app.add_option("--recipe", a.recipe_path,
-                   "Take inputs and options of a recipe, case.toml or its folder; flags go before")
+                   "Take inputs and options of a recipe, case.toml or its folder; flags override it")
         ->type_name("CASE.toml");
     app.add_option("--data", a.data, "Folder that the recipe's input paths start from")
         ->type_name("DIR");
