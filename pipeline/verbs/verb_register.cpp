@@ -110,8 +110,9 @@ Status take_recipe(int argc, char** argv, RegisterArguments& a) {
 // several  --surface takes more than one
 void add_register_options(CLI::App& app, RegisterArguments& a, bool several) {
     RecipeInputs& in = a.recipe.inputs;
-    app.add_option("--recipe", a.recipe_path,
-                   "Take inputs and options of a recipe, case.toml or its folder; flags override it")
+    app.add_option(
+           "--recipe", a.recipe_path,
+           "Take inputs and options of a recipe, case.toml or its folder; flags override it")
         ->type_name("CASE.toml");
     app.add_option("--data", a.data, "Folder that the recipe's input paths start from")
         ->type_name("DIR");
