@@ -29,7 +29,7 @@ struct ToolReadings {
     std::vector<Pose> poses;
 };
 
-// What stands where there is no number: "", "NaN", "-1.#IND", "missing".
+// True for a cell that holds no number: "", "NaN", "-1.#IND", "missing".
 bool is_none(std::string_view cell);
 
 // At least one tool, those of one name joined. Rows are kept as read, NaN and poor rotations

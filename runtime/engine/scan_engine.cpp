@@ -143,8 +143,10 @@ void add_probe_motion(const FrameInput& before, FrameInput& input) {
 
 FrameStatus ScanEngine::frame(double now_s,
                               const ImageSettings& settings,
-                              std::span<std::uint8_t> pixels) {
+                              std::span<std::uint8_t> pixels,
+                              bool unseen) {
     FrameRecord record;
+    record.unseen = unseen;
     ToolPoses& tools = record.tools;
     tools = tools_;
     const SensorAssignment places = places_of(reading_, assignment_);
@@ -202,7 +204,7 @@ FrameStatus ScanEngine::frame(double now_s,
         procedure_.update(time_s + procedure_shift_s_, tools.has_probe, tools.mannequin_from_probe,
                           tools.has_needle, record.needle.mannequin_from_drawn, record.press.solved,
                           {record.press.force_n, record.press.pressure_kpa, record.press.vein_open},
-                          record.acts);
+                          record.acts, unseen);
         record.new_steps = procedure_.new_steps();
         record.new_complications = procedure_.new_complications();
         input.change = procedure_.scene();

@@ -86,7 +86,7 @@ struct FrameRecord {
     std::uint32_t new_steps = 0, new_complications = 0;  // ProcedureRun's, as bits
     double reading_time_s = 0;
     bool skin_not_fitted = false;  // the probe touches skin that was not fitted; see SkinFit
-    bool unseen = false;           // the picture on the screen is frozen; set by who shows it
+    bool unseen = false;           // the picture on the screen was frozen
 };
 
 struct EngineOptions {
@@ -124,8 +124,13 @@ class ScanEngine {
     // rest into those after it. False: dozens of them wait already.
     bool act(const Act& act);
     const ProcedureRun& procedure() const { return procedure_; }
-    // Renders the frame of the last reading; pixels # width * height. Neither throws nor allocates.
-    FrameStatus frame(double now_s, const ImageSettings& settings, std::span<std::uint8_t> pixels);
+    // Renders the frame of the last reading; pixels # width * height. unseen: another picture is on
+    // the screen, so that no step of the procedure is done by looking. Neither throws nor
+    // allocates.
+    FrameStatus frame(double now_s,
+                      const ImageSettings& settings,
+                      std::span<std::uint8_t> pixels,
+                      bool unseen = false);
     // Begins a session: its time and its frame numbers count from here, and no needle is inserted
     // yet. What is rendered afterwards depends on readings, settings and times since now_s alone,
     // so that a replay of the recording gives the same pixels.

@@ -315,10 +315,8 @@ void PagePlayer::frame_unseen(double now_s, const ImageSettings& settings) {
     TrackerReading reading;
     if (hands_->poll(now_s, reading)) engine_->observe(reading, false);
     unseen_.resize(pixels_.size());
-    (void)engine_->frame(now_s, settings, unseen_);
-    FrameRecord record = engine_->last();
-    record.unseen = true;
-    session_->observe(record);
+    (void)engine_->frame(now_s, settings, unseen_, true);
+    session_->observe(engine_->last());
 }
 
 void PagePlayer::keep(const FrameRecord& record, double now_s) {

@@ -244,7 +244,7 @@ bool is_organ(std::string_view tissue) {
         if (tissue == organ) return true;
     return false;
 }
-constexpr double kMostFatInOrgans = 0.12;
+constexpr double kMaxFatInOrgans = 0.12;
 constexpr double kEnoughMl = 50;
 constexpr int kThinBoneHu = 110;  // median of bones with their marrow: 150 to 250
 
@@ -312,7 +312,7 @@ Status check_scan(const LabelVolume& labels,
         report.measures.push_back({"scan_bone_hu", bone_hu});
     }
     if (organ > enough) report.measures.push_back({"scan_fat_in_organs", fat});
-    if (fat <= kMostFatInOrgans) return Done{};
+    if (fat <= kMaxFatInOrgans) return Done{};
     const std::string found = text(
         "%.0f %% of liver, spleen, kidneys and vessels have the density of fat or air", 100 * fat);
     const char* likely = "is the scan mirrored, upside down or of another examination?";

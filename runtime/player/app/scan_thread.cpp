@@ -229,9 +229,8 @@ void ScanThread::observe_unseen(double now_s) {
     unseen_.width_px = options.width_px;
     unseen_.height_px = options.height_px;
     unseen_.pixels.resize(static_cast<std::size_t>(options.width_px) * options.height_px);
-    unseen_.status = engine_->frame(now_s, controls_.settings, unseen_.pixels);
+    unseen_.status = engine_->frame(now_s, controls_.settings, unseen_.pixels, true);
     unseen_.record = engine_->last();
-    unseen_.record.unseen = true;
     unseen_.layout = engine_->renderer().layout();
     if (waiting_) {
         unseen_.record.tools = {};

@@ -121,6 +121,42 @@ TEST(PagePlayer, an_attempt_goes_on_unseen_behind_a_frozen_picture) {
     EXPECT_EQ(copy(player->pixels()).size(), shown.size());
 }
 
+// The list of an attempt and its score agree on what a frozen picture hides: the same hand does the
+// step before a live picture.
+TEST(PagePlayer, no_step_is_done_by_looking_behind_a_frozen_picture) {
+    CaseBundle bundle = testing::small_case();
+    bundle.exercises[0].toml += R"(
+[procedure]
+cut = 1
+[[steps]]
+name = "look"
+title = "Find the vessel"
+done = { shows = "vessel", hold_s = 1 }
+[[items]]
+name = "found"
+step = "look"
+)";
+    for (const bool unseen : {true, false}) {
+        auto opened = PagePlayer::open(bytes_of(bundle), "small");
+        ASSERT_TRUE(opened) << opened.error().message();
+        PagePlayer& player = **opened;
+        ASSERT_TRUE(player.choose_exercise(0, 128, 128));
+        ASSERT_TRUE(player.start_attempt("", "2026-01-31T12:00:00Z", 0));
+        for (int n = 0; n < 60; ++n) {
+            if (unseen)
+                player.frame_unseen(0.05 * n, {});
+            else
+                player.frame(0.05 * n, {});
+        }
+        const bool done = procedure_json(player).find("\"state\":\"done\"") != std::string::npos;
+        EXPECT_EQ(done, !unseen);
+        const auto finished = player.finish_attempt();
+        ASSERT_TRUE(finished) << finished.error().message();
+        ASSERT_TRUE(finished->score.procedure);
+        EXPECT_EQ(finished->score.procedure->passed, !unseen);
+    }
+}
+
 TEST(PagePlayer, a_long_attempt_keeps_fewer_pictures_a_second) {
     const auto player = open_small();
     ASSERT_TRUE(player->choose_exercise(0, 16, 16));
