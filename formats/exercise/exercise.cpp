@@ -461,6 +461,20 @@ std::vector<Target> shown_lesions(const Exercise& exercise) {
     return shown;
 }
 
+std::string lesion_kind_name(const Target& lesion) {
+    return lesion.kind.empty() ? appearance_names()[static_cast<std::size_t>(lesion.look)]
+                               : lesion.kind;
+}
+
+double shown_radius_mm(const Target& lesion) {
+    double radius = lesion.radius_mm;
+    if (const PathologyKind* kind = find_pathology_kind(lesion.kind))
+        for (const LesionPart& part : kind->parts)
+            if (part.place == PartPlace::shell && part.size >= kThinShellMm)
+                radius = std::max(radius, lesion.radius_mm + part.size);
+    return radius;
+}
+
 double outer_radius_mm(const Target& lesion) {
     const Vector3 l = lesion.axes.lengths;
     double reach = lesion.radius_mm * std::max({l.x, l.y, l.z});

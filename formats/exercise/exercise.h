@@ -200,6 +200,14 @@ Rigid start_pose(const Exercise& exercise);
 // The lesions that show in the tissue: findings, then targets.
 std::vector<Target> shown_lesions(const Exercise& exercise);
 
+// Its kind of formats/pathology, or what its look says: "marker", "cyst", ...
+std::string lesion_kind_name(const Target& lesion);
+
+// Radius of the ball or ellipsoid that a picture shows of a lesion, with those shells of its kind
+// that have a thickness of their own: one thinner than kThinShellMm is only an echo of the surface.
+double shown_radius_mm(const Target& lesion);
+inline constexpr double kThinShellMm = 0.75;
+
 // How far a lesion reaches from its centre, with the shells of its kind.
 double outer_radius_mm(const Target& lesion);
 

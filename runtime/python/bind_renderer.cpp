@@ -528,8 +528,10 @@ void bind_renderer(py::module_& module) {
              "depend on `threads`. truth: names of planes; then (pictures, TruthPlanes, list of "
              "facts) is returned. Ctrl-C raises KeyboardInterrupt after the frames in hand.")
         .def("truth", &PyRenderer::truth,
-             "planes"_a = std::vector<std::string>{"labels", "needle", "shadowed", "skin_depth_mm"},
-             "What the last frame shows: (TruthPlanes, facts). facts: a dict of `visible` organs "
+             "planes"_a = std::vector<std::string>{"labels", "needle", "shadowed", "skin_depth_mm",
+                                                   "lesions"},
+             "What the last frame shows: (TruthPlanes, facts). planes: those of TruthPlanes; "
+             "rest_mm only where it is asked for. facts: a dict of `visible` organs and `lesions` "
              "with their areas, `targets` with their distances, the needle's `tip`, `contact`.")
         .def_property_readonly("contact", &PyRenderer::contact,
                                "Whether the probe of the last render() touched the skin.")

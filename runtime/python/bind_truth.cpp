@@ -27,14 +27,26 @@ py::list organs_of(const runtime::FrameTruth& truth, const std::vector<Label>& l
     return organs;
 }
 
+py::list lesions_of(const runtime::FrameTruth& truth, const Exercise& exercise) {
+    py::list lesions;
+    const std::vector<Target> shown = shown_lesions(exercise);
+    for (std::size_t i = 0; i < shown.size(); ++i) {
+        if (truth.pixels_of_lesion[i] == 0) continue;
+        lesions.append(py::dict("index"_a = i + 1, "name"_a = shown[i].name,
+                                "kind"_a = lesion_kind_name(shown[i]),
+                                "area_mm2"_a = truth.pixels_of_lesion[i] * truth.mm2_per_px));
+    }
+    return lesions;
+}
+
 py::list targets_of(const runtime::FrameTruth& truth, const Exercise& exercise) {
     py::list targets;
     for (std::size_t i = 0; i < truth.targets.size(); ++i) {
         const runtime::TargetTruth& target = truth.targets[i];
-        targets.append(py::dict("name"_a = exercise.targets[i].name,
-                                "centre_mm"_a = array_of(target.centre),
-                                "plane_mm"_a = target.plane_mm, "in_image"_a = target.in_image,
-                                "tip_mm"_a = target.tip_mm));
+        targets.append(
+            py::dict("name"_a = exercise.targets[i].name, "centre_mm"_a = array_of(target.centre),
+                     "radius_mm"_a = exercise.targets[i].radius_mm, "plane_mm"_a = target.plane_mm,
+                     "in_image"_a = target.in_image, "tip_mm"_a = target.tip_mm));
     }
     return targets;
 }
@@ -57,9 +69,16 @@ TruthArrays TruthArrays::make(const std::vector<std::string>& names,
             arrays.shadowed = new_array<std::uint8_t>(shape);
         } else if (name == "skin_depth_mm") {
             arrays.skin_depth_mm = new_array<float>(shape);
+        } else if (name == "lesions") {
+            arrays.lesions = new_array<std::uint8_t>(shape);
+        } else if (name == "rest_mm") {
+            Shape places = shape;
+            places.push_back(3);
+            arrays.rest_mm = new_array<float>(places);
         } else {
-            throw py::value_error("truth: no plane " + name +
-                                  "; give labels, needle, shadowed or skin_depth_mm");
+            throw py::value_error(
+                "truth: no plane " + name +
+                "; give labels, needle, shadowed, skin_depth_mm, lesions or rest_mm");
         }
     }
     if (arrays.shadowed.data != nullptr && arrays.labels.data == nullptr)
@@ -68,8 +87,13 @@ TruthArrays TruthArrays::make(const std::vector<std::string>& names,
 }
 
 runtime::TruthPlanes TruthArrays::planes(std::size_t n, std::size_t area) const {
-    return {plane_of<std::uint8_t>(labels, n, area), plane_of<std::uint8_t>(needle, n, area),
-            plane_of<std::uint8_t>(shadowed, n, area), plane_of<float>(skin_depth_mm, n, area)};
+    const std::span<float> rest = plane_of<float>(rest_mm, n, 3 * area);
+    return {.labels = plane_of<std::uint8_t>(labels, n, area),
+            .needle = plane_of<std::uint8_t>(needle, n, area),
+            .shadowed = plane_of<std::uint8_t>(shadowed, n, area),
+            .skin_depth_mm = plane_of<float>(skin_depth_mm, n, area),
+            .lesions = plane_of<std::uint8_t>(lesions, n, area),
+            .rest_mm = {reinterpret_cast<std::array<float, 3>*>(rest.data()), rest.size() / 3}};
 }
 
 py::dict press_of(const runtime::PressReport& press) {
@@ -86,8 +110,9 @@ py::dict facts_of(const runtime::FrameTruth& truth,
     py::dict facts(
         "time_s"_a = truth.time_s, "mannequin_from_probe"_a = array_of(truth.mannequin_from_probe),
         "contact"_a = truth.beams > 0 ? static_cast<double>(truth.beams_touching) / truth.beams : 0,
-        "visible"_a = organs_of(truth, labels), "targets"_a = targets_of(truth, exercise),
-        "press"_a = press_of(truth.press), "tip"_a = py::none());
+        "visible"_a = organs_of(truth, labels), "lesions"_a = lesions_of(truth, exercise),
+        "targets"_a = targets_of(truth, exercise), "press"_a = press_of(truth.press),
+        "tip"_a = py::none());
     if (truth.has_needle) {
         facts["tip"] =
             py::dict("probe_mm"_a = array_of(truth.tip_probe), "in_plane"_a = truth.tip_in_plane,
@@ -115,7 +140,15 @@ void bind_truth(py::module_& module) {
             "uint8; 1: the beam met bone or gas before it came here.")
         .def_property_readonly(
             "skin_depth_mm", [](const TruthArrays& t) { return t.skin_depth_mm.object; },
-            "float32, along the beam from the skin; NaN outside the scanned area.");
+            "float32, along the beam from the skin; NaN outside the scanned area.")
+        .def_property_readonly(
+            "lesions", [](const TruthArrays& t) { return t.lesions.object; },
+            "uint8; `index` of the lesion in facts[\"lesions\"] that the pixel shows; 0: none.")
+        .def_property_readonly(
+            "rest_mm", [](const TruthArrays& t) { return t.rest_mm.object; },
+            "float32 (height, width, 3): where the tissue that the pixel shows lies in the bundle, "
+            "before contact, press, needle and breath moved it; NaN outside the scanned area and "
+            "where a beam is in air.");
 }
 
 }  // namespace sonocase::python

@@ -15,8 +15,8 @@ namespace sonocase::python {
 // Arrays for the planes of `count` frames, of shape (count, height, width), or (height, width)
 // where count is 0. Named as TruthPlanes; those that are not asked for stay None.
 struct TruthArrays {
-    NewArray<std::uint8_t> labels, needle, shadowed;
-    NewArray<float> skin_depth_mm;
+    NewArray<std::uint8_t> labels, needle, shadowed, lesions;
+    NewArray<float> skin_depth_mm, rest_mm;  // rest_mm: with an axis of 3 more
 
     // names: of planes; raises ValueError for another one.
     static TruthArrays make(const std::vector<std::string>& names,

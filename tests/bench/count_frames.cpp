@@ -126,8 +126,8 @@ class Frames {
         must(static_cast<bool>(truth), "no truth");
         std::vector<std::uint8_t> labels(pixels_.size()), needle = labels, shadowed = labels;
         std::vector<float> depth(pixels_.size());
-        TruthPlanes planes{labels, needle, {}, {}};
-        if (all_planes) planes = {labels, needle, shadowed, depth};
+        TruthPlanes planes{.labels = labels, .needle = needle};
+        if (all_planes) planes.shadowed = shadowed, planes.skin_depth_mm = depth;
         const auto all = [&] {
             for (FrameInput input : poses_) {
                 input.time_s = 1.3;  // in the middle of a breath

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// core_write_case BUNDLE SESSION [flow|procedure]: a small case (in whose vessel blood flows; with
-// a second exercise that is a procedure), and a session of three seconds in which the probe slides
-// over it and a needle goes in.
+// core_write_case BUNDLE SESSION [flow|procedure|lesion]: a small case (in whose vessel blood
+// flows; with a second exercise that is a procedure; with one that has a cyst beside the vessel),
+// and a session of three seconds in which the probe slides over it and a needle goes in.
 #include <cstdint>
 #include <fstream>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -49,6 +50,16 @@ int main(int argc, char** argv) {
     const std::string_view with = argc == 4 ? argv[3] : "";
     if (with == "flow") testing::add_flow(bundle);
     if (with == "procedure") bundle.exercises.push_back({"line", testing::small_procedure_toml()});
+    if (with == "lesion") {
+        std::string toml = testing::small_exercise_toml();
+        const auto put = [&](std::string_view from, std::string_view to) {
+            toml.replace(toml.find(from), from.size(), to);
+        };
+        put("\"scan\"", "\"cyst\"");
+        put("\"paper\"", "\"physical\"");
+        put("centre = [0, 0, 25]", "centre = [22, 0, 30]\nlook = \"cyst\"");
+        bundle.exercises.push_back({"cyst", toml});
+    }
     const Sequence session = sequence_from_session(small_session());
     const bool good = write(argv[1], write_bundle(bundle)) &&
                       write(argv[2], write_sequence(session, SequenceForm::mha));

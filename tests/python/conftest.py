@@ -45,6 +45,15 @@ def flowing(tmp_path_factory):
     return case
 
 
+@pytest.fixture(scope="session")
+def with_cyst(tmp_path_factory):
+    """The same case with an exercise `cyst`, whose target is one, beside the vessel."""
+    folder = tmp_path_factory.mktemp("cyst")
+    case = folder / "cyst.sonocase"
+    subprocess.run([BIN / "core_write_case", case, folder / "small.igs.mha", "lesion"], check=True)
+    return case
+
+
 @pytest.fixture
 def case(small):
     return sonocase.Case.open(small[0])

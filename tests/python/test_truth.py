@@ -49,6 +49,31 @@ def test_labels_are_the_volume_s(case, pose):
         np.testing.assert_array_equal(np.isnan(planes.skin_depth_mm[clear & ~scanned]), True)
 
 
+def test_a_pixel_leads_to_its_tissue_at_rest_and_to_its_lesion(with_cyst, pose):
+    case = sonocase.Case.open(with_cyst)
+    renderer = sonocase.Renderer(case, "cyst", size=(160, 140))
+    for press_mm in (0, 6):
+        renderer.render(pose, time_s=1.3, press_mm=press_mm)
+        planes, facts = renderer.truth(["labels", "lesions", "rest_mm"])
+        assert planes.rest_mm.shape == (140, 160, 3)
+        shown = ~np.isnan(planes.rest_mm[..., 0])
+        rest = planes.rest_mm[shown].astype(float)
+        # Places within 0.01 mm of a surface may fall on its other side in single precision.
+        assert np.mean(np.array(case.labels_at(rest)) == planes.labels[shown]) > 0.998
+        assert not planes.labels[~shown].any()
+        target = renderer.exercise.targets[0]
+        within = np.linalg.norm(rest - target.centre_mm, axis=-1) < target.radius_mm
+        lesion = planes.lesions[shown] == facts["lesions"][0]["index"]
+        assert np.mean(within == lesion) > 0.998 and lesion.sum() > 40
+        assert facts["lesions"][0]["name"] == target.name and facts["lesions"][0]["kind"] == "cyst"
+        assert facts["lesions"][0]["area_mm2"] == pytest.approx(lesion.sum() * renderer.mm_per_px**2)
+        assert facts["targets"][0]["radius_mm"] == target.radius_mm
+    renderer = sonocase.Renderer(case, "cyst", size=(160, 140), effects=["-targets"])
+    renderer.render(pose)
+    planes, facts = renderer.truth(["lesions"])
+    assert not planes.lesions.any() and facts["lesions"] == []
+
+
 def test_facts_of_a_needle_in_the_plane(case, pose):
     renderer = sonocase.Renderer(case, size=(512, 512))
     tip = pose[:3, 3] + 35 * pose[:3, 2]  # straight down the middle beam

@@ -12,6 +12,7 @@
 #include <numbers>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "formats/scoring/anatomy.h"
@@ -50,6 +51,13 @@ struct TruthRenderer::Impl {
     void needle_facts(const FrameInput& input);
     void target_facts();
     bool needle_shape_of(const FrameInput& input, NeedleShape& shape) const;
+    void lesions(const FrameInput& input, const TruthPlanes& planes);
+    void rest(const TruthPlanes& planes);
+    Point3 point_of_rest(int n) const {
+        return bundle->grid.point_from_voxel({rest_vx[0][static_cast<std::size_t>(n)],
+                                              rest_vx[1][static_cast<std::size_t>(n)],
+                                              rest_vx[2][static_cast<std::size_t>(n)]});
+    }
 
     CaseView bundle;
     Exercise exercise;
@@ -63,6 +71,11 @@ struct TruthRenderer::Impl {
     NeedleSight sight;
     NeedleModel needle;
     TruthVoxels voxels;
+    std::vector<Target> drawn;     // shown_lesions() of the exercise; empty: the picture draws none
+    std::array<bool, 256> soft{};  // of a label: gives way to a lesion
+    // Of a run's pixels, for a lesion and places at rest.
+    std::array<std::vector<float>, 3> rest_vx;
+    std::vector<std::uint8_t> run_labels;
     bool vessels_move;                         // effect pulsation is on
     std::unique_ptr<press::ProbePress> probe;  // null: effect deformation is off
     std::unique_ptr<press::PressView> press_view;
@@ -87,6 +100,15 @@ constexpr std::uint64_t kEachByte = 0x0101010101010101u;
 
 bool valid_pose(const Rigid& t) {
     return is_finite(t) && orthonormality_error(t.rotation) < 1e-3 && determinant(t.rotation) > 0;
+}
+
+bool draws_lesions(const RenderOptions& o) {
+    if (o.model != ImageModel::physical) return false;
+    const auto own = kPhysicalModel.effects;
+    const auto choice = choose_effects(o.effects, own, kPaperModel.effects);
+    for (std::size_t i = 0; choice && i < own.size(); ++i)
+        if (std::string_view(own[i]) == "targets") return choice->on[i];
+    return false;
 }
 
 // False where the plane lies so many voxels away that single precision cannot tell neighbours
@@ -123,6 +145,14 @@ TruthRenderer::Impl::Impl(CaseView view,
     const ImageModelInfo& info = o.model == ImageModel::physical ? kPhysicalModel : kPaperModel;
     if (!(needle.slab_mm > 0)) needle.slab_mm = info.needle_slab_mm(exercise);
     truth.targets.resize(exercise.targets.size());
+    drawn = shown_lesions(exercise);
+    truth.pixels_of_lesion.resize(drawn.size());
+    if (!draws_lesions(o)) drawn.clear();
+    const std::vector<int> tissue = tissue_of_label(*view);
+    for (std::size_t l = 1; l < view->labels.size(); ++l)
+        soft[l] = tissue[l] >= 0 && view->tissues[tissue[l]].kind == TissueKind::soft;
+    for (std::vector<float>& row : rest_vx) row.resize(geometry.width_px);
+    run_labels.resize(geometry.width_px);
     if (!moves.deformation) return;
     probe = std::make_unique<press::ProbePress>(bundle, exercise, simd);
     press_view = std::make_unique<press::PressView>(geometry, press::press_face(e.probe));
@@ -332,12 +362,80 @@ void TruthRenderer::Impl::count_shadowed(const std::uint8_t* shadowed,
     for (; n < count; ++n) truth.shadowed_pixels_of_label[labels[n]] += shadowed[n];
 }
 
+// A lesion shows where the place at rest lies in it and soft tissue gives way to it: later ones
+// over earlier ones, as the picture draws them.
+void TruthRenderer::Impl::lesions(const FrameInput& input, const TruthPlanes& planes) {
+    fill_plane(planes.lesions, std::uint8_t{0});
+    const Rigid& pose = input.mannequin_from_probe;
+    const double px = geometry.mm_per_px;
+    const auto first_target = exercise.findings.size();
+    for (std::size_t i = 0; i < std::min<std::size_t>(drawn.size(), 255); ++i) {
+        const Target& lesion = drawn[i];
+        double radius = shown_radius_mm(lesion);
+        if (lesion.look == TargetLook::none || !(radius > 0)) continue;
+        if (i >= first_target && i - first_target < input.change.target_scale.size())
+            radius *= input.change.target_scale[i - first_target];
+        const Vector3 l = lesion.axes.lengths;
+        Point3 now = anatomy.moved(lesion.centre, input.time_s);
+        if (pressing != nullptr) now = pressing->current_position(now);
+        const Point3 p = inverse(pose) * now;
+        // What moves tissue bends a lesion by less than its own size.
+        const double reach = 2 * radius * std::max({l.x, l.y, l.z}) + 5;
+        if (std::abs(p.y) > reach) continue;
+        const auto place = [&](double mm, double origin_px) {  // of a lesion far aside as well
+            return static_cast<int>(std::clamp(mm / px + origin_px, -1.0, 1e6));
+        };
+        const int first_row = place(p.z - reach, geometry.origin_y_px),
+                  last_row = place(p.z + reach, geometry.origin_y_px),
+                  first_column = place(p.x - reach, geometry.origin_x_px),
+                  last_column = place(p.x + reach, geometry.origin_x_px);
+        pixels.for_each_run([&](const TruthRun& run, std::size_t at) {
+            if (run.row < first_row || run.row > last_row) return;
+            const int begin = std::max(first_column - run.begin, 0),
+                      end = std::min(last_column + 1 - run.begin, run.count);
+            if (begin >= end) return;
+            float* const to[3] = {rest_vx[0].data(), rest_vx[1].data(), rest_vx[2].data()};
+            truth_rest(simd, rows, run, begin, end, to);
+            const std::uint8_t* label = planes.labels.data() + at;
+            if (planes.labels.empty()) {
+                truth_labels(simd, rows, run, begin, end, run_labels.data());
+                label = run_labels.data();
+            }
+            for (int n = begin; n < end; ++n) {
+                if (!soft[label[n]]) continue;
+                const Vector3 f = transpose(lesion.axes.axes) * (point_of_rest(n) - lesion.centre);
+                if (norm(Vector3{f.x / l.x, f.y / l.y, f.z / l.z}) < radius)
+                    planes.lesions[at + static_cast<std::size_t>(n)] =
+                        static_cast<std::uint8_t>(i + 1);
+            }
+        });
+    }
+    for (const std::uint8_t lesion : planes.lesions)
+        if (lesion > 0) ++truth.pixels_of_lesion[lesion - 1];
+}
+
+void TruthRenderer::Impl::rest(const TruthPlanes& planes) {
+    constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+    pixels.set_outside(planes.rest_mm, std::array<float, 3>{kNone, kNone, kNone});
+    pixels.for_each_run([&](const TruthRun& run, std::size_t at) {
+        float* const to[3] = {rest_vx[0].data(), rest_vx[1].data(), rest_vx[2].data()};
+        truth_rest(simd, rows, run, 0, run.count, to);
+        for (int n = 0; n < run.count; ++n) {
+            const Point3 p = point_of_rest(n);
+            planes.rest_mm[at + static_cast<std::size_t>(n)] = {
+                static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
+        }
+    });
+}
+
 void TruthRenderer::Impl::planes_of(const FrameInput& input, const TruthPlanes& planes) {
     const std::size_t area = static_cast<std::size_t>(geometry.width_px) * geometry.height_px;
     assert(planes.labels.empty() || planes.labels.size() == area);
     assert(planes.needle.empty() || planes.needle.size() == area);
     assert(planes.shadowed.empty() || planes.shadowed.size() == area);
     assert(planes.skin_depth_mm.empty() || planes.skin_depth_mm.size() == area);
+    assert(planes.lesions.empty() || planes.lesions.size() == area);
+    assert(planes.rest_mm.empty() || planes.rest_mm.size() == area);
     (void)area;
     std::fill(first_hard_mm.begin(), first_hard_mm.end(), kNoHardMm);
     if (!planes.labels.empty()) {
@@ -351,6 +449,8 @@ void TruthRenderer::Impl::planes_of(const FrameInput& input, const TruthPlanes& 
             });
         }
     }
+    if (!planes.lesions.empty()) lesions(input, planes);
+    if (!planes.rest_mm.empty()) rest(planes);
     TruthPlanes along = planes;
     if (planes.labels.empty()) along.shadowed = {};
     beams(along);
@@ -366,6 +466,8 @@ void TruthRenderer::Impl::planes_of(const FrameInput& input, const TruthPlanes& 
         flip_rows(planes.needle, width);
         flip_rows(planes.shadowed, width);
         flip_rows(planes.skin_depth_mm, width);
+        flip_rows(planes.lesions, width);
+        flip_rows(planes.rest_mm, width);
     }
 }
 
@@ -394,6 +496,7 @@ const FrameTruth& TruthRenderer::render(const FrameInput& frame,
     m.truth.posed = valid_pose(input.mannequin_from_probe);
     m.truth.pixels_of_label.fill(0);
     m.truth.shadowed_pixels_of_label.fill(0);
+    std::fill(m.truth.pixels_of_lesion.begin(), m.truth.pixels_of_lesion.end(), 0u);
     if (!m.truth.posed) return m.truth;
     const std::optional<RenderedFrame> found =
         renderer != nullptr ? renderer->rendered(frame) : std::optional<RenderedFrame>();

@@ -29,7 +29,7 @@
 namespace sonocase::runtime {
 
 // The caller's planes, # width * height each, row by row from the top; an empty one is left out and
-// costs nothing. Pixels outside the scanned area hold 0, and NaN in skin_depth_mm.
+// costs nothing. Pixels outside the scanned area hold 0, and NaN where numbers are real.
 struct TruthPlanes {
     std::span<std::uint8_t> labels;    // palette index; 0: outside the body
     std::span<std::uint8_t> needle;    // 0: none, 1: shaft, 2: tip (its last kTipLengthMm)
@@ -37,6 +37,12 @@ struct TruthPlanes {
     // Distance along the beam from where it enters the body to the tissue that the pixel shows.
     // Negative in the gel before the body. NaN where the beam finds no body within 30 mm.
     std::span<float> skin_depth_mm;
+    // 1 + the number in shown_lesions() of the lesion that the pixel shows; 0: none, or model
+    // `paper`, or effect `targets` is off.
+    std::span<std::uint8_t> lesions = {};
+    // Where the tissue that the pixel shows lies at rest, frame `mannequin`, x y z. NaN outside the
+    // scanned area and where a beam that does not touch is in air.
+    std::span<std::array<float, 3>> rest_mm = {};
 };
 inline constexpr double kTipLengthMm = 2;
 
@@ -54,6 +60,7 @@ struct FrameTruth {
     double time_s = 0;
     std::array<std::uint32_t, 256> pixels_of_label{};           // in the scanned area
     std::array<std::uint32_t, 256> shadowed_pixels_of_label{};  // 0 without the plane `shadowed`
+    std::vector<std::uint32_t> pixels_of_lesion;  // # shown_lesions(); 0 without the plane
     double mm2_per_px = 0;
     int beams_touching = 0, beams = 0;  // all touch unless model `physical` has effect contact on
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 
 #include "formats/volume/boundary_record.h"
 #include "formats/volume/brick_volume.h"
@@ -363,6 +364,77 @@ HWY_NOINLINE I labels_of_region(D d, const TruthFrameRows& f, const Places<D>& p
         label);
 }
 
+// Where the pixels of a run lie at rest.
+template <class D>
+class RunPlaces {
+  public:
+    HWY_INLINE RunPlaces(D d, const TruthFrameRows& f, const TruthRun& run)
+        : f_(f), run_(run), base_{base(d, 0), base(d, 1), base(d, 2)} {}
+
+    // first: of a vector of pixels, of which `used` belong to the run. state: kInAir and kClosed.
+    HWY_INLINE Places<D> at(D d, int first, int used, IntOf<D>& state) const {
+        const hn::RebindToSigned<D> di;
+        const auto n = hn::Add(hn::Iota(d, 0.0f), hn::Set(d, static_cast<float>(first)));
+        const auto column = hn::Add(n, hn::Set(d, static_cast<float>(run_.begin)));
+        const PlanePoints<D> point{
+            hn::Mul(hn::Sub(column, hn::Set(d, f_.origin_x_px)), hn::Set(d, f_.mm_per_px)),
+            hn::Set(d, (static_cast<float>(run_.row) - f_.origin_y_px) * f_.mm_per_px),
+            hn::LoadU(d, run_.r_mm + first),
+            hn::Add(hn::ConvertTo(d, rays_of(d, run_, first)), hn::Set(d, 0.5f))};
+        const auto along = [&](hn::Vec<D> from, int a) HWY_ATTR {
+            return hn::Add(from, hn::Mul(n, hn::Set(d, static_cast<float>(f_.across[a]))));
+        };
+        Places<D> p{along(base_.x, 0), along(base_.y, 1), along(base_.z, 2)};
+        state = hn::Zero(di);
+        if (f_.gap_mm != nullptr) {
+            const auto gap = RayNumbers<D>(d, run_, first, used, f_.rays).of(d, f_.gap_mm);
+            close_gap(d, f_, point, gap, p);
+            state = hn::IfThenElseZero(hn::RebindMask(di, hn::Lt(gap, hn::Zero(d))),
+                                       hn::Set(di, kInAir));
+        }
+        if (f_.press != nullptr) {
+            auto closed = hn::Zero(di);
+            press_back(d, f_, point, p, closed);
+            state = hn::Or(state,
+                           hn::IfThenElseZero(hn::Gt(closed, hn::Zero(di)), hn::Set(di, kClosed)));
+        }
+        if (f_.weight != nullptr) breathe_back(d, f_, p);
+        return p;
+    }
+
+  private:
+    HWY_INLINE hn::Vec<D> base(D d, int a) const {
+        return hn::Set(d, static_cast<float>(f_.origin[a] + run_.row * f_.down[a] +
+                                             run_.begin * f_.across[a]));
+    }
+    const TruthFrameRows& f_;
+    const TruthRun& run_;
+    Places<D> base_;
+};
+
+void rest_of_run(
+    const TruthFrameRows& f, const TruthRun& run, int begin, int end, float* const voxel[3]) {
+    using D = hn::ScalableTag<float>;
+    const D d;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    const RunPlaces<D> places(d, f, run);
+    for (int first = begin; first < end; first += lanes) {
+        const int used = std::min(lanes, end - first);
+        auto state = hn::Zero(hn::RebindToSigned<D>());
+        const Places<D> p = places.at(d, first, used, state);
+        const auto in_air =
+            hn::RebindMask(d, hn::Ne(hn::And(state, hn::Set(hn::RebindToSigned<D>(), kInAir)),
+                                     hn::Zero(hn::RebindToSigned<D>())));
+        const auto none = hn::Set(d, std::numeric_limits<float>::quiet_NaN());
+        HWY_ALIGN float rest[kMaxLanes];
+        const auto store = [&](hn::Vec<D> v, int a) HWY_ATTR {
+            hn::Store(hn::IfThenElse(in_air, none, v), d, rest);
+            std::copy_n(rest, used, voxel[a] + first);
+        };
+        store(p.x, 0), store(p.y, 1), store(p.z, 2);
+    }
+}
+
 void labels_of_run(
     const TruthFrameRows& f, const TruthRun& run, int begin, int end, std::uint8_t* labels) {
     using D = hn::ScalableTag<float>;
@@ -370,42 +442,14 @@ void labels_of_run(
     const hn::RebindToSigned<D> di;
     const hn::Rebind<std::uint8_t, D> d8;
     const int lanes = static_cast<int>(hn::Lanes(d));
-    const auto iota = hn::Iota(d, 0.0f);
-    const auto base = [&](int a) HWY_ATTR {
-        return hn::Set(
-            d, static_cast<float>(f.origin[a] + run.row * f.down[a] + run.begin * f.across[a]));
-    };
-    const auto base_x = base(0), base_y = base(1), base_z = base(2);
-    const auto step = [&](int a) HWY_ATTR { return hn::Set(d, static_cast<float>(f.across[a])); };
-    const auto step_x = step(0), step_y = step(1), step_z = step(2);
+    const RunPlaces<D> places(d, f, run);
     Stretch s;
     for (int from = begin; from < end; from += kStretch) {
         const int to = std::min(from + kStretch, end);
         for (int first = from; first < to; first += lanes) {
             const int used = std::min(lanes, to - first), at = first - from;
-            const auto n = hn::Add(iota, hn::Set(d, static_cast<float>(first)));
-            const auto column = hn::Add(n, hn::Set(d, static_cast<float>(run.begin)));
-            const PlanePoints<D> point{
-                hn::Mul(hn::Sub(column, hn::Set(d, f.origin_x_px)), hn::Set(d, f.mm_per_px)),
-                hn::Set(d, (static_cast<float>(run.row) - f.origin_y_px) * f.mm_per_px),
-                hn::LoadU(d, run.r_mm + first),
-                hn::Add(hn::ConvertTo(d, rays_of(d, run, first)), hn::Set(d, 0.5f))};
-            Places<D> p{hn::Add(base_x, hn::Mul(n, step_x)), hn::Add(base_y, hn::Mul(n, step_y)),
-                        hn::Add(base_z, hn::Mul(n, step_z))};
             auto state = hn::Zero(di);
-            if (f.gap_mm != nullptr) {
-                const auto gap = RayNumbers<D>(d, run, first, used, f.rays).of(d, f.gap_mm);
-                close_gap(d, f, point, gap, p);
-                state = hn::IfThenElseZero(hn::RebindMask(di, hn::Lt(gap, hn::Zero(d))),
-                                           hn::Set(di, kInAir));
-            }
-            if (f.press != nullptr) {
-                auto closed = hn::Zero(di);
-                press_back(d, f, point, p, closed);
-                state = hn::Or(
-                    state, hn::IfThenElseZero(hn::Gt(closed, hn::Zero(di)), hn::Set(di, kClosed)));
-            }
-            if (f.weight != nullptr) breathe_back(d, f, p);
+            const Places<D> p = places.at(d, first, used, state);
             const Voxels<D> voxels = voxels_of(d, f, p);
             // A fine region is looked up from the places themselves.
             const Places<D>& kept = f.region != nullptr ? p : voxels.off;
@@ -651,6 +695,7 @@ HWY_AFTER_NAMESPACE();
 namespace sonocase::runtime {
 
 HWY_EXPORT(labels_of_run);
+HWY_EXPORT(rest_of_run);
 HWY_EXPORT(places_of_tile);
 HWY_EXPORT(labels_of_inner_tile);
 HWY_EXPORT(labels_of_outer_tile);
@@ -663,6 +708,15 @@ void truth_labels(SimdTarget simd,
                   int end,
                   std::uint8_t* labels) {
     HWY_DISPATCH_TABLE(labels_of_run)[simd.index](frame, run, begin, end, labels);
+}
+
+void truth_rest(SimdTarget simd,
+                const TruthFrameRows& frame,
+                const TruthRun& run,
+                int begin,
+                int end,
+                float* const voxel[3]) {
+    HWY_DISPATCH_TABLE(rest_of_run)[simd.index](frame, run, begin, end, voxel);
 }
 
 bool truth_places(SimdTarget simd,

@@ -138,6 +138,15 @@ void truth_labels(SimdTarget simd,
                   int end,
                   std::uint8_t* labels);
 
+// Where the run's pixels [begin, end) lie at rest, in voxels; NaN where the beam is in air. voxel:
+// x, y and z, each of the whole run.
+void truth_rest(SimdTarget simd,
+                const TruthFrameRows& frame,
+                const TruthRun& run,
+                int begin,
+                int end,
+                float* const voxel[3]);
+
 // What follows from a pixel's beam and depth alone; see TruthPlanes. Of a run; null: not wanted.
 struct BeamPlanes {
     std::uint8_t* shadowed = nullptr;  // r > first_hard_mm[ray]

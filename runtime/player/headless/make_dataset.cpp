@@ -173,7 +173,7 @@ Json record_of(const DatasetPlan& plan,
 
 // The arrays of a chunk in format npy.
 struct ChunkArrays {
-    std::vector<std::uint8_t> images, labels, needle, shadowed, depth;
+    std::vector<std::uint8_t> images, labels, needle, shadowed, lesions, depth;
 
     void add(const std::vector<std::uint8_t>& picture, const TruthPlaneBuffers& planes) {
         const auto append = [](auto& to, const auto& from) {
@@ -184,6 +184,7 @@ struct ChunkArrays {
         append(labels, planes.labels);
         append(needle, planes.needle);
         append(shadowed, planes.shadowed);
+        append(lesions, planes.lesions);
         append(depth, planes.skin_depth_mm);
     }
 
@@ -196,7 +197,7 @@ struct ChunkArrays {
         };
         for (const Status& done : {one("images", "|u1", images), one("labels", "|u1", labels),
                                    one("needle", "|u1", needle), one("shadow", "|u1", shadowed),
-                                   one("depth", "<f4", depth)}) {
+                                   one("lesions", "|u1", lesions), one("depth", "<f4", depth)}) {
             if (!done) return done;
         }
         return Done{};

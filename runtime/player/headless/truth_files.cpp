@@ -57,6 +57,19 @@ Json organs_json(const FrameTruth& truth, const std::vector<Label>& labels) {
     return organs;
 }
 
+Json lesions_json(const FrameTruth& truth, const Exercise& exercise) {
+    Json lesions = Json::array();
+    const std::vector<Target> shown = shown_lesions(exercise);
+    for (std::size_t i = 0; i < shown.size(); ++i) {
+        if (truth.pixels_of_lesion[i] == 0) continue;
+        lesions.push_back({{"index", i + 1},
+                           {"name", shown[i].name},
+                           {"kind", lesion_kind_name(shown[i])},
+                           {"area_mm2", truth.pixels_of_lesion[i] * truth.mm2_per_px}});
+    }
+    return lesions;
+}
+
 std::vector<std::uint16_t> hundredths(const std::vector<float>& depth_mm) {
     std::vector<std::uint16_t> out;
     out.reserve(depth_mm.size());
@@ -104,11 +117,13 @@ std::string truth_json(const FrameTruth& truth,
                        {"dent_mm", {truth.needle.tent_mm, truth.needle.drag_mm}}};
     }
     line["visible"] = organs_json(truth, labels);
+    line["lesions"] = lesions_json(truth, exercise);
     Json targets = Json::array();
     for (std::size_t i = 0; i < truth.targets.size(); ++i) {
         const TargetTruth& target = truth.targets[i];
         targets.push_back({{"name", exercise.targets[i].name},
                            {"centre_mm", point_json(target.centre)},
+                           {"radius_mm", exercise.targets[i].radius_mm},
                            {"plane_mm", target.plane_mm},
                            {"in_image", target.in_image},
                            {"tip_mm", number_or_null(target.tip_mm)}});
@@ -123,10 +138,15 @@ TruthPlaneBuffers::TruthPlaneBuffers(int width, int height)
       labels(static_cast<std::size_t>(width) * height),
       needle(labels.size()),
       shadowed(labels.size()),
+      lesions(labels.size()),
       skin_depth_mm(labels.size()) {}
 
 TruthPlanes TruthPlaneBuffers::planes() {
-    return {labels, needle, shadowed, skin_depth_mm};
+    return {.labels = labels,
+            .needle = needle,
+            .shadowed = shadowed,
+            .skin_depth_mm = skin_depth_mm,
+            .lesions = lesions};
 }
 
 Status TruthPlaneBuffers::write(const std::string& folder, const std::string& name) const {
@@ -135,6 +155,8 @@ Status TruthPlaneBuffers::write(const std::string& folder, const std::string& na
     if (Status done = write_png16(path("labels"), width_px, height_px, wide); !done) return done;
     if (Status done = write_png(path("needle"), width_px, height_px, 1, needle); !done) return done;
     if (Status done = write_png(path("shadow"), width_px, height_px, 1, shadowed); !done)
+        return done;
+    if (Status done = write_png(path("lesions"), width_px, height_px, 1, lesions); !done)
         return done;
     return write_png16(path("depth"), width_px, height_px, hundredths(skin_depth_mm));
 }

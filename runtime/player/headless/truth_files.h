@@ -21,16 +21,15 @@ std::string truth_json(const FrameTruth& truth,
                        const std::vector<Label>& labels,
                        const Exercise& exercise);
 
-// Writes the planes of a frame: STEMlabels_NNNNN.png (16 bits, palette index), needle_NNNNN.png,
-// shadow_NNNNN.png (8 bits), depth_NNNNN.png (16 bits, hundredths of a millimetre below the skin;
-// 0: none), each before `name` as `folder/KIND_name.png`.
+// Writes the planes of a frame as `folder/KIND_name.png`: labels (16 bits, palette index), needle,
+// shadow, lesions (8 bits), depth (16 bits, hundredths of a millimetre below the skin; 0: none).
 struct TruthPlaneBuffers {
     TruthPlaneBuffers(int width, int height);
     TruthPlanes planes();
     Status write(const std::string& folder, const std::string& name) const;
 
     int width_px, height_px;
-    std::vector<std::uint8_t> labels, needle, shadowed;
+    std::vector<std::uint8_t> labels, needle, shadowed, lesions;
     std::vector<float> skin_depth_mm;
 };
 

@@ -111,6 +111,8 @@ class TruthPlanes:
     needle: Optional[npt.NDArray[np.uint8]]
     shadowed: Optional[npt.NDArray[np.uint8]]
     skin_depth_mm: Optional[npt.NDArray[np.float32]]
+    lesions: Optional[npt.NDArray[np.uint8]]
+    rest_mm: Optional[npt.NDArray[np.float32]]
 
 class Renderer:
     size: tuple[int, int]

@@ -30,7 +30,7 @@ from . import Error
 # Name in a frame, of the picture's file, and of the array's file.
 _PLANES = {"image": ("image", "images"), "labels": ("labels", "labels"),
            "needle": ("needle", "needle"), "shadowed": ("shadow", "shadow"),
-           "skin_depth_mm": ("depth", "depth")}
+           "skin_depth_mm": ("depth", "depth"), "lesions": ("lesions", "lesions")}
 
 
 def _read(path):

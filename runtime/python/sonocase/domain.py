@@ -35,7 +35,7 @@ from .data import common_classes, in_classes
 # Keys of a probe, and of a needle beside where it goes, with their limits: those of an exercise's file.
 PROBE = {"shape": None, **_core._PROBE_LIMITS}
 NEEDLE = {"make": None, "gauge": _core._GAUGE_LIMITS}
-PLANES = ("labels", "needle", "shadowed", "skin_depth_mm")
+PLANES = ("labels", "needle", "shadowed", "skin_depth_mm", "lesions", "rest_mm")
 
 # What a sample draws beside machine and probe: standard, and limits.
 _SAMPLE = {

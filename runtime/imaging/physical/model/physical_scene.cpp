@@ -163,10 +163,8 @@ void add_ball(
     s.targets.push_back(ball);
 }
 
-// Adds the parts of each target, from the outermost shell to the core. A shell thinner than
-// kThinShellMm is left to the echo of the surface.
+// Adds the parts of each target, from the outermost shell to the core.
 void add_targets(const std::vector<Target>& targets, PhysicalScene& s) {
-    constexpr double kThinShellMm = 0.75;
     for (int n = 0; n < static_cast<int>(targets.size()); ++n) {
         const Target& t = targets[static_cast<std::size_t>(n)];
         if (t.look == TargetLook::none) continue;

@@ -101,6 +101,114 @@ TEST(TruthPressed, OnePixelAsksTheSameAsAllTogether) {
         }
 }
 
+// A ball and an ellipsoid in muscle, by their own formulas at the place that each pixel has at
+// rest.
+TEST(TruthPressed, LesionsAndPlacesAtRestAreThoseOfEachPixel) {
+    for (Exercise exercise : block_exercises()) {
+        Finding finding;
+        finding.lesion.name = "oval";
+        finding.lesion.centre = {-7, 1, 31};
+        finding.lesion.radius_mm = 4;
+        finding.lesion.look = TargetLook::cyst;
+        finding.lesion.axes.axes = rotation_about({0, 1, 0}, 0.5);
+        finding.lesion.axes.lengths = {1.6, 0.8, 1 / (1.6 * 0.8)};
+        exercise.findings = {finding};
+        Target ball;
+        ball.name = "ball";
+        ball.centre = {4, 0, 29};
+        ball.radius_mm = 6;
+        ball.look = TargetLook::cyst;
+        exercise.targets = {ball};
+        for (const bool mirrored : {false, true}) {
+            const RenderOptions options = picture(110, 120);
+            auto truth = truth_of(pressed_block(), exercise, options);
+            for (const double mm : {-1.0, 12.0}) {
+                Planes planes(options);
+                FrameInput input = pressed_input(mm, 2.5);
+                input.settings.flip_left_right = mirrored;
+                input.change.target_scale[0] = 0.8;  // of the ball
+                const FrameTruth& facts = truth.render(input, planes.spans());
+                int scanned = 0, differ = 0;
+                std::uint32_t pixels[3] = {};
+                for (int row = 0; row < 120; ++row)
+                    for (int column = 0; column < 110; ++column) {
+                        const std::size_t at = planes.at(column, row);
+                        const PixelTruth pixel = truth.at(input, column, row);
+                        const auto [x, y, z] = planes.rest[at];
+                        if (pixel.label > 0) {
+                            ASSERT_FALSE(std::isnan(x));
+                        }
+                        ASSERT_LT(planes.lesions[at], 3);
+                        ++pixels[planes.lesions[at]];
+                        if (!pixel.scanned) {
+                            ASSERT_TRUE(std::isnan(x));
+                            continue;
+                        }
+                        ++scanned;
+                        // Nodes of the press field are a few beams apart, and end at the sector's
+                        // edge.
+                        EXPECT_TRUE(!(distance(pixel.rest, {x, y, z}) >= 0.4) ||
+                                    !truth.at(input, column - 2, row).scanned ||
+                                    !truth.at(input, column + 2, row).scanned)
+                            << int(exercise.probe.shape) << ": " << column << " " << row;
+                        int expected = 0;
+                        if (pixel.label == PressedBlock::muscle) {
+                            const Vector3 f = transpose(finding.lesion.axes.axes) *
+                                              (pixel.rest - finding.lesion.centre);
+                            const Vector3 half = 4 * finding.lesion.axes.lengths;
+                            if (norm(Vector3{f.x / half.x, f.y / half.y, f.z / half.z}) < 1)
+                                expected = 1;
+                            if (distance(pixel.rest, ball.centre) < 0.8 * 6) expected = 2;
+                        }
+                        differ += planes.lesions[at] != expected;
+                    }
+                EXPECT_LT(differ, 0.01 * scanned);
+                EXPECT_EQ(facts.pixels_of_lesion, (std::vector{pixels[1], pixels[2]}));
+                EXPECT_GT(pixels[1] * facts.mm2_per_px, 20);
+                EXPECT_GT(pixels[2] * facts.mm2_per_px, 40);
+            }
+        }
+    }
+}
+
+TEST(TruthPressed, ALesionLiesWhereThePictureHasIt) {
+    Exercise exercise = pressed_exercise();
+    Target cyst;
+    cyst.centre = {0, 0, 32};
+    cyst.radius_mm = 6;
+    cyst.look = TargetLook::cyst;
+    exercise.targets = {cyst};
+    for (const double mm : {0.0, 8.0}) {
+        const FrameInput input = pressed_input(mm);
+        const auto drawn = [&](const char* effects, Planes& planes) {
+            const RenderOptions options = picture(200, 250, {effects});
+            auto renderer = Renderer::create(pressed_block(), exercise, options);
+            EXPECT_TRUE(renderer);
+            std::vector<std::uint8_t> pixels(planes.labels.size());
+            renderer->render(input, pixels);
+            truth_of(pressed_block(), exercise, options).render(input, planes.spans());
+            return pixels;
+        };
+        Planes with(picture(200, 250)), without(picture(200, 250));
+        const auto shown = drawn("all", with), plain = drawn("-targets", without);
+        double sum[2] = {}, count[2] = {};  // change of grey inside, and beside it at its depths
+        for (int row = 0; row < 250; ++row)
+            for (int column = 0; column < 200; ++column) {
+                const std::size_t at = with.at(column, row);
+                EXPECT_EQ(without.lesions[at], 0);
+                if (std::isnan(with.rest[at][0])) continue;
+                const auto [x, y, z] = with.rest[at];
+                const double from = distance(Point3{x, y, z}, cyst.centre);
+                if (std::abs(from - 6) < 1 || from > 9 || std::abs(z - 32) > 4) continue;
+                EXPECT_EQ(with.lesions[at], from < 6 ? 1 : 0);
+                sum[from < 6] += plain[at] - shown[at];
+                ++count[from < 6];
+            }
+        EXPECT_GT(sum[1] / count[1], 15);
+        EXPECT_NEAR(sum[0] / count[0], 0, 4);
+    }
+}
+
 TEST(TruthPressed, AnAdvancingNeedleDentsTheWallBeforeIt) {
     const PressedBlock shape;
     const RenderOptions options = picture(260, 260, {"-contact"});

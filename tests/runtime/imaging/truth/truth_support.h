@@ -21,19 +21,24 @@ struct Planes {
           labels(static_cast<std::size_t>(o.width_px) * o.height_px, 77),
           needle(labels.size(), 77),
           shadowed(labels.size(), 77),
-          depth(labels.size(), -77.0f) {}
-    TruthPlanes spans() { return {labels, needle, shadowed, depth}; }
+          lesions(labels.size(), 77),
+          depth(labels.size(), -77.0f),
+          rest(labels.size(), {-77.0f, -77.0f, -77.0f}) {}
+    TruthPlanes spans() { return {labels, needle, shadowed, depth, lesions, rest}; }
     std::size_t at(int column, int row) const {
         return static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column);
     }
     bool operator==(const Planes& o) const {
         // Bit by bit: NaN equals itself.
         return labels == o.labels && needle == o.needle && shadowed == o.shadowed &&
-               std::memcmp(depth.data(), o.depth.data(), 4 * depth.size()) == 0;
+               lesions == o.lesions &&
+               std::memcmp(depth.data(), o.depth.data(), 4 * depth.size()) == 0 &&
+               std::memcmp(rest.data(), o.rest.data(), 12 * rest.size()) == 0;
     }
     int width;
-    std::vector<std::uint8_t> labels, needle, shadowed;
+    std::vector<std::uint8_t> labels, needle, shadowed, lesions;
     std::vector<float> depth;
+    std::vector<std::array<float, 3>> rest;
 };
 
 inline TruthRenderer truth_of(CaseView bundle,
