@@ -19,14 +19,27 @@ void mark_closed(std::span<const PressTissue> tissues,
     if (out.any) {
         out.node.fill(0);
         out.row.fill(false);
+        out.part.fill(false);
     }
     out.any = false;
+    out.open = -1;
+    if (std::find(samples.lumen.begin(), samples.lumen.end(), true) == samples.lumen.end()) return;
+    const auto in_lumen = [&](int j, int i) {
+        return j < kFineRows && samples.lumen[j] && samples.drains.row(j)[i] >= 0.5f;
+    };
+    for (int i = 0; i < kColumns; ++i)
+        for (int first = 0, j = 0; j < kFineRows; ++j) {
+            if (!in_lumen(j, i)) continue;
+            double height = 0, touching = 0;  // and the height at which walls touch
+            for (first = j; in_lumen(j, i); ++j) {
+                const float share = samples.drains.row(j)[i];
+                height += fine_height(j) * double{columns.stretch.row(j)[i]};
+                touching += fine_height(j) * (share * kClosed + (1 - share));
+            }
+            for (int n = first; height < touching && n < j; ++n) out.part[n * kColumns + i] = true;
+        }
     const auto closed = [&](int j, int i) {
-        if (j < 0 || j >= kFineRows || i < 0 || i >= kColumns) return false;
-        if (!samples.lumen[j]) return false;
-        const float share = samples.drains.row(j)[i];
-        return share >= 0.5f &&
-               columns.stretch.row(j)[i] < share * static_cast<float>(kClosed) + (1 - share);
+        return j >= 0 && j < kFineRows && i >= 0 && i < kColumns && out.part[j * kColumns + i];
     };
     // A round lumen reaches less far up and down beside its middle, so half a row around is
     // searched, and a quarter of a row in the columns beside.
@@ -72,7 +85,7 @@ void mark_closed(std::span<const PressTissue> tissues,
         }
     }
     constexpr double kMinMm2 = 4;
-    out.open = rest * column_width_mm(face) < kMinMm2 ? -1 : open / rest;
+    if (rest * column_width_mm(face) >= kMinMm2) out.open = open / rest;
 }
 
 namespace {
@@ -387,11 +400,8 @@ bool PressField::closed(Point3 rest) const {
     constexpr int kAround = kParts / 2;
     const int i = std::min(static_cast<int>(column), kColumns - 2);
     for (int n = std::max(0, j - kAround); n <= std::min(kFineRows - 1, j + kAround); ++n)
-        for (int c = i; c <= i + 1; ++c) {
-            const float share = work_->samples.drains.row(n)[c];
-            const float open = share * static_cast<float>(kClosed) + (1 - share);
-            if (share >= 0.5f && work_->columns.stretch.row(n)[c] < open) return true;
-        }
+        for (int c = i; c <= i + 1; ++c)
+            if (work_->closed.part[n * kColumns + c]) return true;
     return false;
 }
 

@@ -30,6 +30,7 @@ namespace sonocase::runtime::press {
 struct PressClosed {
     std::array<std::int32_t, kTableRows * kStride> node{};
     std::array<bool, kTableRows> row{};  // some node of the row
+    std::array<bool, kFineRows * kColumns> part{};  // of rows: in a lumen that is closed there
     bool any = false;
     // Area of the draining lumens under the face that a picture shows open, over that at rest;
     // negative: that is less than 4 mm^2.
@@ -40,8 +41,8 @@ struct PressClosed {
     std::int32_t at(int m, int column) const { return row_of(m)[column]; }
 };
 
-// A part of a row is closed where a lumen fills at least half of it and its stretch is below
-// kClosed. Cost: nothing where there is no lumen, 5 us where there is.
+// Walls touch all along a column's way through a lumen or not at all: where its height there, over
+// parts of rows that a lumen fills to at least half, is below kClosed of its height at rest. Cost: nothing where there is no lumen, 5 us where there is.
 void mark_closed(std::span<const PressTissue> tissues,
                  const PressFace& face,
                  const PressSamples& samples,

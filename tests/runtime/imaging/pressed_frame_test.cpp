@@ -210,7 +210,7 @@ TEST(PressedFrame, TheVeinClosesAndTheArteryStaysRound) {
         field.see(std::abs(vein_pixels - expected_vein) / vein_rest);
         field.see(std::abs(artery_pixels - expected_artery) / artery_rest);
         if (mm >= 8) {
-            EXPECT_LT(vein_pixels / vein_rest, 0.6);
+            EXPECT_LT(vein_pixels / vein_rest, 0.65);
             EXPECT_GT(artery_pixels / artery_rest, 0.8);
         }
         if (mm >= 18) closed.see(vein_pixels / vein_rest);

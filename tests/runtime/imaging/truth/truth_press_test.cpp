@@ -171,6 +171,34 @@ TEST(TruthPressed, LesionsAndPlacesAtRestAreThoseOfEachPixel) {
     }
 }
 
+// A vein under a probe is a slit that closes from its ends, without holes or stripes of wall in it.
+TEST(TruthPressed, AVeinIsWholeHoweverDeepItIsPressed) {
+    const RenderOptions options = picture(260, 260);
+    auto truth = truth_of(pressed_block(), pressed_exercise(), options);
+    Planes planes(options);
+    int open = 0, shut = 0;
+    for (int mm = 0; mm <= 24; mm += 2) {
+        truth.render(pressed_input(mm), planes.spans());
+        int vein = 0, in_two = 0;
+        for (int column = 0; column < 260; ++column) {
+            int begins = 0;
+            for (int row = 1; row < 260; ++row) {
+                const auto is_vein = [&](int r) {
+                    return planes.labels[planes.at(column, r)] == PressedBlock::vein_label;
+                };
+                vein += is_vein(row);
+                begins += is_vein(row) && !is_vein(row - 1);
+            }
+            in_two += begins > 1;
+        }
+        EXPECT_LE(in_two, 3) << mm;  // a node's width where the slit ends
+        open += vein > 500;
+        shut += vein < 50;
+    }
+    EXPECT_GT(open, 3);
+    EXPECT_GT(shut, 0);
+}
+
 TEST(TruthPressed, ALesionLiesWhereThePictureHasIt) {
     Exercise exercise = pressed_exercise();
     Target cyst;
