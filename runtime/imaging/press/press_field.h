@@ -29,7 +29,7 @@ namespace sonocase::runtime::press {
 // nodes, so that the nodes around it are marked.
 struct PressClosed {
     std::array<std::int32_t, kTableRows * kStride> node{};
-    std::array<bool, kTableRows> row{};  // some node of the row
+    std::array<bool, kTableRows> row{};             // some node of the row
     std::array<bool, kFineRows * kColumns> part{};  // of rows: in a lumen that is closed there
     bool any = false;
     // Area of the draining lumens under the face that a picture shows open, over that at rest;
@@ -42,7 +42,8 @@ struct PressClosed {
 };
 
 // Walls touch all along a column's way through a lumen or not at all: where its height there, over
-// parts of rows that a lumen fills to at least half, is below kClosed of its height at rest. Cost: nothing where there is no lumen, 5 us where there is.
+// parts of rows that a lumen fills to at least half, is below kClosed of its height at rest. Cost:
+// nothing where there is no lumen, 5 us where there is.
 void mark_closed(std::span<const PressTissue> tissues,
                  const PressFace& face,
                  const PressSamples& samples,
