@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// core_write_case BUNDLE SESSION [flow|procedure]: a small case (in whose vessel blood flows; with
-// a second exercise that is a procedure), and a session of three seconds in which the probe slides
-// over it and a needle goes in.
+// core_write_case BUNDLE SESSION [flow|procedure|titled]: a small case (in whose vessel blood
+// flows; with a second exercise that is a procedure; with a title that is not its name), and a
+// session of three seconds in which the probe slides over it and a needle goes in.
 #include <cstdint>
 #include <fstream>
 #include <string_view>
@@ -49,6 +49,7 @@ int main(int argc, char** argv) {
     const std::string_view with = argc == 4 ? argv[3] : "";
     if (with == "flow") testing::add_flow(bundle);
     if (with == "procedure") bundle.exercises.push_back({"line", testing::small_procedure_toml()});
+    if (with == "titled") bundle.manifest.recipe = "title = \"A vessel to find\"\n";
     const Sequence session = sequence_from_session(small_session());
     const bool good = write(argv[1], write_bundle(bundle)) &&
                       write(argv[2], write_sequence(session, SequenceForm::mha));
