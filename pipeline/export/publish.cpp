@@ -291,11 +291,16 @@ struct SiteCourse {
 std::optional<Error> missing_for(const CourseModule& module,
                                  const TomlTable& table,
                                  const std::vector<ReadCase>& cases) {
-    std::vector<std::string> titles, exercises;
+    // By the case's name, as in recordings and as the window does; a title only where no case has
+    // that name, as courses of before name one.
+    const bool named = std::any_of(cases.begin(), cases.end(), [&](const ReadCase& one) {
+        return one.site.case_name == module.case_name;
+    });
+    std::vector<std::string> names, exercises;
     const SiteCase::Entry* found = nullptr;
     for (const ReadCase& one : cases) {
-        titles.push_back(one.site.title);
-        if (one.site.title != module.case_name) continue;
+        names.push_back(one.site.case_name);
+        if ((named ? one.site.case_name : one.site.title) != module.case_name) continue;
         for (const SiteCase::Entry& entry : one.site.exercises) {
             exercises.push_back(entry.name);
             if (entry.name == module.exercise) found = &entry;
@@ -304,7 +309,7 @@ std::optional<Error> missing_for(const CourseModule& module,
     if (exercises.empty())
         return Error{"the module '" + module.name + "' needs the case '" + module.case_name +
                          "', which is not among those given",
-                     table.place("case"), suggest_name(module.case_name, titles)};
+                     table.place("case"), suggest_name(module.case_name, names)};
     if (!found)
         return Error{"the case '" + module.case_name + "' has no exercise '" + module.exercise +
                          "', which the module '" + module.name + "' needs",

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// core_write_case BUNDLE SESSION [flow|procedure|lesion]: a small case (in whose vessel blood
-// flows; with a second exercise that is a procedure; with one that has a cyst beside the vessel),
-// and a session of three seconds in which the probe slides over it and a needle goes in.
+// core_write_case BUNDLE SESSION [flow|procedure|lesion|titled]: a small case (in whose vessel blood
+// flows; with a second exercise that is a procedure, or has a cyst beside the vessel; with a title
+// that is not its name), and a session of three seconds in which the probe slides over it and a
+// needle goes in.
 #include <cstdint>
 #include <fstream>
 #include <string>
@@ -60,6 +61,7 @@ int main(int argc, char** argv) {
         put("centre = [0, 0, 25]", "centre = [22, 0, 30]\nlook = \"cyst\"");
         bundle.exercises.push_back({"cyst", toml});
     }
+    if (with == "titled") bundle.manifest.recipe = "title = \"A vessel to find\"\n";
     const Sequence session = sequence_from_session(small_session());
     const bool good = write(argv[1], write_bundle(bundle)) &&
                       write(argv[2], write_sequence(session, SequenceForm::mha));

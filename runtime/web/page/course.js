@@ -3,11 +3,11 @@
 // The course on the page: its modules with how the trainee stands in them, and of one module the question, the text,
 // the expert, practice and the gate. Where the trainee stands follows by the window's own rule, in the program.
 import {PlainError} from './core.js';
-import {KeptCourse, hold_alone, platform_of} from './lms.js';
+import {KeptCourse, hold_alone, platform_of, preferred_language} from './lms.js';
 import {statement, trainee} from './results.js';
 import {element} from './scan.js';
 import {fetch_twice} from './source.js';
-import {t} from './words.js';
+import {language_in_use, languages, t} from './words.js';
 
 const $ = (id) => document.getElementById(id);
 
@@ -27,13 +27,16 @@ const kCourseWords = {
         exam_only: 'Only exams count for this gate.',
         other_tab: 'The course is open in another tab. Go on there; when that tab is closed, this one goes on by itself.',
         damaged: 'What was kept of this course is damaged in part and begins anew there.', keeps_nothing: 'This browser keeps nothing: progress is lost when the page is closed.',
+        asking: 'The learning platform is being asked. You can begin: what you do is kept in this browser, and handed over once it answers.',
         no_platform: 'No learning platform answers here. The course works all the same; progress is kept in this browser.',
         session_over: 'The learning platform has closed this session. Go on here: what you do is kept in this browser, and handed over when you open the module from the platform again.',
         bad_launch: 'The learning platform opened this page without all that cmi5 asks for. Progress is kept in this browser. Tell whoever runs the platform.',
         key_expired: 'The key of this launch has been used or is too old. Open the module from the learning platform again; until then what you do is kept in this browser.',
-        no_answer: 'The learning platform does not answer. What you do is kept in this browser, and handed over when you open the module again.',
+        no_answer: 'The learning platform does not answer. What you do is kept in this browser. The platform is asked again by itself, and when you open the module again.',
         no_launch_data: 'The learning platform has no data for this launch. Progress is kept in this browser. Tell whoever runs the platform.',
         waits: 'Not yet handed over to the learning platform: {}. It is tried again by itself.', refused: 'The learning platform refuses {} records.',
+        pass_refused: 'It refuses the pass, which is kept in this browser and told again at the next launch. Tell whoever runs the platform.',
+        waits_in_page: 'This browser has no room to keep what waits: leave this page open until all is handed over.',
         not_judged: 'Opened for looking around: nothing is judged.', left: 'All is handed over. You can close this page.', left_waiting: 'Not all could be handed over. It is kept in this browser, and handed over when you open the module again.',
     },
     de: {
@@ -50,13 +53,16 @@ const kCourseWords = {
         exam_only: 'Für diese Schwelle zählen nur Prüfungen.',
         other_tab: 'Der Kurs ist in einem anderen Tab offen. Machen Sie dort weiter; wird jener Tab geschlossen, geht es hier von selbst weiter.',
         damaged: 'Was von diesem Kurs behalten war, ist teils beschädigt und beginnt dort neu.', keeps_nothing: 'Dieser Browser behält nichts: Der Fortschritt geht verloren, wenn die Seite geschlossen wird.',
+        asking: 'Die Lernplattform wird gefragt. Sie können beginnen: Was Sie tun, bleibt in diesem Browser und wird übergeben, sobald sie antwortet.',
         no_platform: 'Hier antwortet keine Lernplattform. Der Kurs geht trotzdem; der Fortschritt bleibt in diesem Browser.',
         session_over: 'Die Lernplattform hat diese Sitzung geschlossen. Machen Sie hier weiter: Was Sie tun, bleibt in diesem Browser und wird übergeben, wenn Sie das Modul auf der Plattform wieder öffnen.',
         bad_launch: 'Die Lernplattform hat diese Seite ohne alles geöffnet, was cmi5 verlangt. Der Fortschritt bleibt in diesem Browser. Sagen Sie es dem Betreiber der Plattform.',
         key_expired: 'Der Schlüssel dieses Aufrufs ist verbraucht oder zu alt. Öffnen Sie das Modul auf der Lernplattform neu; bis dahin bleibt in diesem Browser, was Sie tun.',
-        no_answer: 'Die Lernplattform antwortet nicht. Was Sie tun, bleibt in diesem Browser und wird übergeben, wenn Sie das Modul wieder öffnen.',
+        no_answer: 'Die Lernplattform antwortet nicht. Was Sie tun, bleibt in diesem Browser. Die Plattform wird von selbst wieder gefragt, und wenn Sie das Modul wieder öffnen.',
         no_launch_data: 'Die Lernplattform hat keine Daten zu diesem Aufruf. Der Fortschritt bleibt in diesem Browser. Sagen Sie es dem Betreiber der Plattform.',
         waits: 'Noch nicht an die Lernplattform übergeben: {}. Es wird von selbst wieder versucht.', refused: 'Die Lernplattform lehnt {} Einträge ab.',
+        pass_refused: 'Sie lehnt das Bestehen ab. Es bleibt in diesem Browser und wird beim nächsten Öffnen noch einmal gemeldet. Sagen Sie es dem Betreiber der Plattform.',
+        waits_in_page: 'Dieser Browser hat keinen Platz für das, was wartet: Lassen Sie diese Seite offen, bis alles übergeben ist.',
         not_judged: 'Zum Umsehen geöffnet: Nichts wird gewertet.', left: 'Alles ist übergeben. Sie können diese Seite schließen.', left_waiting: 'Nicht alles konnte übergeben werden. Es bleibt in diesem Browser und wird übergeben, wenn Sie das Modul wieder öffnen.',
     },
 };
@@ -64,8 +70,18 @@ function course_language() { return document.documentElement.lang.startsWith('de
 function course_words(key, ...what) {
     return kCourseWords[course_language()][key].replaceAll('{}', () => String(what.shift() ?? ''));
 }
-// As plain_identifier() of the packages has it.
-const plain_identifier = (name) => name.replaceAll(/[^0-9A-Za-z]/g, '-') || '-';
+// As plain_identifier() of the packages has it, which goes by the bytes of UTF-8.
+const plain_identifier = (name) => [...new TextEncoder().encode(name)].map((byte) => String.fromCharCode(byte).replace(/[^0-9A-Za-z]/, '-')).join('') || '-';
+// The trainee's own day and time in the form of UTC, which the program's rule reads.
+const local_time = (ms) => new Date(ms - 60000 * new Date(ms).getTimezoneOffset()).toISOString();
+// The language that the address or the learner asked for on this page; null: neither.
+function chosen_language() {
+    try {
+        return new URLSearchParams(location.search).get('lang') ?? localStorage.getItem('sonocase-language');
+    } catch {
+        return null;  // forbidden, as in some frames
+    }
+}
 
 export class CourseView {
     // app: for what leads away from the course
@@ -98,8 +114,14 @@ export class CourseView {
         if (list.package && !this.single()) platform.words = 'no_platform';
         this.kept = new KeptCourse(this.course.name, this.names, trainee(), platform);
         this.kept.read();
+        this.kept.changed = () => this.go_on();
+        platform.on_words = () => this.say();
+        platform.on_language = (list) => this.show_in(list);
         this.shown = wanted[0] ?? null;
-        await new Promise((settled) => hold_alone(this.kept.lock_name(), () => settled(this.take_over()), () => {
+        await new Promise((settled) => hold_alone(this.kept.lock_name(), () => {
+            this.take_over().catch((error) => this.app.say(error));
+            settled();
+        }, () => {
             this.alone = false;
             this.refresh();
             settled();
@@ -107,12 +129,31 @@ export class CourseView {
         this.show_card();
         if (asked || list.package) this.show();
     }
-    // Once no other tab has the course.
+    // Once no other tab has the course. A platform may take long to answer: the course is shown meanwhile.
     async take_over() {
-        await this.kept.begin();
+        const asked = this.kept.begin();
         this.alone = true;
+        this.refresh();
+        await asked;
+        this.go_on();
+    }
+    // The platform has answered, or not; whoever is at a button meanwhile stays there.
+    go_on() {
+        const focused = document.activeElement?.closest('#course button')?.textContent;
         this.tell();
         this.refresh();
+        if (focused) [...document.querySelectorAll('#course button')].find((one) => one.textContent === focused)?.focus({preventScroll: true});
+    }
+    // list: the languages that the learner prefers on the platform. True: the page is loaded again in one of them.
+    show_in(list) {
+        const code = preferred_language(list, languages().map(([one]) => one));
+        // Only before the learner has begun, and where the page keeps the key of its launch.
+        if (this.switched || !code || code === language_in_use() || chosen_language() || this.app.scan.shown() || !this.platform.keep_session()) return false;
+        this.switched = true;
+        const address = new URL(location.href);
+        address.searchParams.set('lang', code);
+        location.replace(address);
+        return true;
     }
     // Again in another language.
     read() {
@@ -140,12 +181,12 @@ export class CourseView {
             state.attempts.forEach((one, n) => {
                 const key = `${one.started_ms} ${module.case} ${module.exercise}`;
                 const entry = attempts.get(key) ?? {case: module.case, exercise: module.exercise, passed: one.passed, exam: one.exam, values: {},
-                    started: new Date(one.started_ms).toISOString()};
+                    started_ms: one.started_ms, started: local_time(one.started_ms)};
                 if (n === state.attempts.length - 1 && module.measure && state.value !== null) entry.values[module.measure] = state.value;
                 attempts.set(key, entry);
             });
         }
-        const now = this.core.stand_in_course({today: new Date().toISOString(), attempts: [...attempts.values()].sort((a, b) => a.started < b.started ? -1 : 1), answers});
+        const now = this.core.stand_in_course({today: local_time(Date.now()), attempts: [...attempts.values()].sort((a, b) => a.started_ms - b.started_ms).map(({started_ms, ...one}) => one), answers});
         this.course.modules.forEach((module, n) => {
             const one = now.modules[n];
             if (this.single()) one.open = true;  // the platform leads through the course
@@ -181,6 +222,7 @@ export class CourseView {
     }
     refresh() {
         if (!this.kept) return;
+        this.left = false;
         const now = this.now = this.standing();
         const {modules} = this.course;
         if (!this.shown) this.shown = modules[now.next < 0 ? modules.length - 1 : now.next].name;
@@ -195,12 +237,13 @@ export class CourseView {
         this.show_module(modules[n], now.modules[n], n);
         if (!$('course-card').hidden) this.show_card();
     }
-    say(words = '') {
+    say() {
         const {platform} = this, waiting = platform.waiting();
-        $('course-notice').textContent = [words, this.alone ? '' : course_words('other_tab'),
+        $('course-notice').textContent = [this.left ? course_words(waiting || platform.words ? 'left_waiting' : 'left') : '', this.alone ? '' : course_words('other_tab'),
             platform.words ? course_words(platform.words) : '',
             platform.last_status === 401 || platform.last_status === 403 ? course_words('key_expired') : waiting ? course_words('waits', waiting) : '',
-            platform.refused ? course_words('refused', platform.refused) : '', platform.judged === false ? course_words('not_judged') : '',
+            platform.waits_in_page?.() ? course_words('waits_in_page') : '', platform.refused ? course_words('refused', platform.refused) : '',
+            platform.pass_refused ? course_words('pass_refused') : '', platform.judged === false ? course_words('not_judged') : '',
             this.kept.damaged ? course_words('damaged') : '', this.kept.keeps ? '' : course_words('keeps_nothing')].filter((one) => one).join(' ');
     }
     state_words(now) {
@@ -219,7 +262,18 @@ export class CourseView {
         item.append(button);
         return item;
     }
-    entry_of(module) { return this.list.cases.find((one) => one.title === module.case); }
+    // By the case's name, as in recordings; by its title where a course was published that names that.
+    entry_of(module) {
+        const {cases} = this.list, has = (one) => one.exercises?.some((exercise) => exercise.name === module.exercise);
+        const named = cases.filter((one) => (one.case ?? one.title) === module.case), titled = cases.filter((one) => one.title === module.case);
+        const found = named.length ? named : titled;
+        return found.find(has) ?? found[0];
+    }
+    // Attempts and the open case have the name.
+    case_of(module) {
+        const entry = this.entry_of(module);
+        return entry?.case ?? entry?.title ?? module.case;
+    }
     measure_title(name) { return t(this.metrics.get(name)?.title ?? name); }
     value_words(module, value) {
         if (value === null || !Number.isFinite(value)) return '–';
@@ -310,7 +364,7 @@ export class CourseView {
 
     async go_to(module) {
         const {app} = this, index = app.description?.exercises.findIndex((one) => one.name === module.exercise) ?? -1;
-        if (app.core && app.description?.case_name === module.case && index >= 0) await app.choose_exercise(index);
+        if (app.core && app.description?.case_name === this.case_of(module) && index >= 0) await app.choose_exercise(index);
         else await app.open(this.entry_of(module), module.exercise);
         return app.scan.shown();
     }
@@ -352,7 +406,7 @@ export class CourseView {
     attempt_done(attempt, score) {
         $('after-course').hidden = true;
         if (!this.kept) return;
-        const here = this.course.modules.filter((module) => this.names.includes(module.name) && module.case === attempt.case_name && module.exercise === attempt.exercise);
+        const here = this.course.modules.filter((module) => this.names.includes(module.name) && this.case_of(module) === attempt.case_name && module.exercise === attempt.exercise);
         if (!here.length) return;
         let words = course_words('not_counted');
         if (this.alone) {
@@ -396,6 +450,7 @@ export class CourseView {
             return;
         }
         close();  // works where a script opened the page
-        this.say(course_words(this.platform.waiting() ? 'left_waiting' : 'left'));
+        this.left = true;
+        this.say();
     }
 }

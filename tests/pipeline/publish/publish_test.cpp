@@ -6,10 +6,16 @@
 
 #include <cstring>
 #include <filesystem>
+#include <map>
 
 #include "formats/base/digest.h"
 #include "formats/bundle/case_bundle.h"
+#include "formats/exercise/case_exercises.h"
+#include "formats/exercise/course.h"
 #include "formats/files/atomic_file.h"
+#include "formats/text/toml_reader.h"
+#include "pipeline/export/course_package.h"
+#include "support/paths.h"
 #include "support/small_case.h"
 #include "support/temporary_folder.h"
 
@@ -32,6 +38,7 @@ class Publish : public ::testing::Test {
             put(std::string("program/") + name, name);
         CaseBundle bundle = sonocase::testing::small_case();
         bundle.manifest.case_name = "Round </script> body";
+        bundle.manifest.recipe = "title = \"A vessel to find\"\n";
         bytes_ = write_bundle(bundle);
         ASSERT_TRUE(write_file(case_path("round body"), std::span<const std::uint8_t>(bytes_)));
         options_.program_folder = folder_.path() + "/program";
@@ -225,6 +232,7 @@ TEST_F(Publish, a_course_that_lacks_something_is_refused_at_its_line) {
     std::string text = refused("Round </script> body", "Neck");
     says(text, "course.toml:8");
     says(text, "'look' needs the case 'Neck'");
+    says(text, "valid here: Round </script> body");
     text = refused("exercise = \"scan\"", "exercise = \"scam\"");
     says(text, "course.toml:9");
     says(text, "did you mean 'scan'?");
@@ -235,6 +243,59 @@ TEST_F(Publish, a_course_that_lacks_something_is_refused_at_its_line) {
     text = refused("name = \"in plane\"", "name = \"look\"");
     says(text, "given twice");
     EXPECT_FALSE(fs::exists(site("-wrong") + "/cases.json"));
+}
+
+TEST_F(Publish, a_course_that_names_a_case_by_its_title_is_still_taken) {
+    std::string text = kCourse;
+    for (std::size_t at = 0; (at = text.find("Round </script> body")) != text.npos;)
+        text.replace(at, 20, "A vessel to find");
+    options_.course = folder_.write("course.toml", text);
+    const auto published = publish({case_path("round body")}, site(), options_);
+    EXPECT_TRUE(published) << published.error().message();
+}
+
+// Stand-ins with the names, titles and exercises of the recipes that the course is written for.
+TEST_F(Publish, the_course_of_the_scenarios_is_published_with_its_cases) {
+    const std::string scenarios = SONOCASE_SOURCE "/scenarios/";
+    options_.course = scenarios + "course/course.toml";
+    const auto course = parse_course(text_of(options_.course), options_.course);
+    ASSERT_TRUE(course) << course.error().message();
+    std::map<std::string, CaseBundle> bundles;
+    for (const CourseModule& module : course->modules) {
+        const std::string recipe = scenarios + module.case_name + "/case.toml";
+        auto [it, is_new] = bundles.try_emplace(module.case_name, sonocase::testing::small_case());
+        CaseBundle& bundle = it->second;
+        if (is_new) {
+            bundle.manifest.recipe = text_of(recipe);
+            const auto table = TomlTable::parse(bundle.manifest.recipe, recipe);
+            ASSERT_TRUE(table) << table.error().message();
+            table->text("name", bundle.manifest.case_name);
+            EXPECT_NE(case_title(bundle.manifest), bundle.manifest.case_name) << recipe;
+            bundle.exercises.clear();
+        }
+        EXPECT_NE(bundle.manifest.recipe.find('"' + module.exercise + '"'), std::string::npos)
+            << recipe << " has no exercise " << module.exercise;
+        std::string exercise = sonocase::testing::small_exercise_toml();
+        exercise.replace(exercise.find("scan"), 4, module.exercise);
+        if (!module.expert.empty())
+            exercise.replace(exercise.find("along\"\nsnap"), 5, module.expert);
+        bundle.exercises.push_back({module.exercise, exercise});
+    }
+    std::vector<std::string> paths;
+    for (const auto& [name, bundle] : bundles) {
+        paths.push_back(case_path(name));
+        ASSERT_TRUE(write_file(paths.back(), std::span<const std::uint8_t>(write_bundle(bundle))));
+    }
+    const auto published = publish(paths, site(), options_);
+    EXPECT_TRUE(published) << published.error().message();
+}
+
+// The page finds its module by the same rule (course.js).
+TEST_F(Publish, names_beyond_ascii_are_plain_by_their_bytes) {
+    EXPECT_EQ(plain_identifier("in plane 2"), "in-plane-2");
+    EXPECT_EQ(plain_identifier("Gef\xC3\xA4\xC3\x9F"), "Gef----");
+    EXPECT_EQ(plain_identifier("\xE9\x87\x9D"), "---");
+    EXPECT_EQ(plain_identifier(""), "-");
 }
 
 TEST_F(Publish, packages_need_a_course_and_a_kind_that_exists) {

@@ -13,7 +13,7 @@ import {Browser, expect, expect_equal, folder, run, run_tests} from './support.m
 const [program, bin] = process.argv.slice(2);
 const work = folder(), pictures = process.env.COURSE_PICTURES;
 const case_file = join(work, 'small.sonocase'), site = join(work, 'site');
-run(join(bin, 'core_write_case'), case_file, join(work, 'small.igs.mha'));
+run(join(bin, 'core_write_case'), case_file, join(work, 'small.igs.mha'), 'titled');  // a course names a case, not its title
 writeFileSync(join(work, 'course.toml'), `name = "First needles"
 title = "First needles"
 text = "Two modules, each with a gate."
@@ -43,12 +43,20 @@ title = "Erste Nadeln"
 `);
 run(join(bin, 'sonocase'), 'publish', case_file, '-o', site, '--program', program, '--course', join(work, 'course.toml'), '--package', 'cmi5,scorm12,scorm2004');
 
+// Of modules whose names are not plain: on a platform's host as well.
+const far = join(work, 'far.toml');
+writeFileSync(far, ['Gefäß', '针'].map((name) => `[[modules]]\nname = "${name}"\ntitle = "${name} 1"\ntext = "t"\ncase = "cylinder"\nexercise = "scan"\ngate = { passes_in_a_row = 1 }\n`)
+    .join('').replace(/^/, 'name = "far"\n'));
+run(join(bin, 'sonocase'), 'publish', case_file, '-o', join(work, 'far'), '--program', program, '--course', far, '--package', 'cmi5,scorm12,scorm2004');
+
 // Packages lie unpacked on the platform's own host, where its API and its record store are.
 for (const kind of ['cmi5', 'scorm12', 'scorm2004']) {
-    for (const [name, bytes] of read_zip(readFileSync(join(site, `First-needles-${kind}.zip`)))) {
-        const file = join(work, 'platform', kind, name);
-        mkdirSync(dirname(file), {recursive: true});
-        writeFileSync(file, bytes);
+    for (const [from, folder] of [[join(site, `First-needles-${kind}.zip`), kind], [join(work, 'far', `far-${kind}.zip`), `far-${kind}`]]) {
+        for (const [name, bytes] of read_zip(readFileSync(from))) {
+            const file = join(work, 'platform', folder, name);
+            mkdirSync(dirname(file), {recursive: true});
+            writeFileSync(file, bytes);
+        }
     }
 }
 writeFileSync(join(work, 'platform', 'platform.js'), readFileSync(new URL('platform.mjs', import.meta.url)));
@@ -61,6 +69,7 @@ const server = await served(site_server(join(work, 'platform'), (request, respon
     request.on('data', (data) => { body += data; });
     request.on('end', () => {
         if (!platform.online) { request.socket.destroy(); return; }
+        if (platform.hangs?.(request.url)) { (platform.held ??= []).push(response); return; }
         const {status, text} = platform.handle(request.method, request.url, request.headers, body);
         response.writeHead(status, {'Content-Type': 'application/json'}).end(text);
     });
@@ -120,8 +129,27 @@ await run_tests({
             }
         }
     },
+    async modules_with_names_of_any_script_are_opened_by_their_package() {
+        for (const kind of ['cmi5', 'scorm12', 'scorm2004']) {
+            const manifest = read_zip(readFileSync(join(work, 'far', `far-${kind}.zip`)));
+            expect_equal(package_faults(manifest, kind).join('\n'), '', kind);
+            const queries = [...manifest.get(kind === 'cmi5' ? 'cmi5.xml' : 'imsmanifest.xml').toString('utf8').matchAll(/\?module=[^<"]*/g)].map(([query]) => query);
+            expect_equal(queries.join(), '?module=Gef----,?module=---', `${kind}: addresses`);
+            for (const [n, title] of ['Gefäß 1', '针 1'].entries()) {
+                if (kind !== 'cmi5' && n > 0) continue;
+                const page = await browser.page(800, 600);
+                await page.open(`${address(server)}far-${kind}/index.html${queries[n]}`);
+                await page.until('document.getElementById("module-title")');
+                expect_equal(await text(page, 'module-title'), title, kind);
+                await page.close();
+            }
+        }
+    },
     async a_site_shows_its_course_from_the_question_to_the_gate() {
         const page = await browser.page(800, 600);
+        // At any hour one of these two places has another day than UTC.
+        const zone = new Date().getUTCHours() < 12 ? 'Pacific/Pago_Pago' : 'Pacific/Kiritimati';
+        await page.send('Emulation.setTimezoneOverride', {timezoneId: zone});
         await page.open(address(own_server));
         await page.until('!document.getElementById("course-card").hidden');
         expect((await text(page, 'course-card')).includes('Passed 0 of 2'), 'the card');
@@ -162,6 +190,9 @@ await run_tests({
         expect((await text(page, 'after-course')).includes('The gate is passed'), 'passed');
         await press(page, 'after-to-course');
         expect((await text(page, 'modules')).includes('Passed'), 'said in the list');
+        const day = (add) => new Date(Date.now() + 86400e3 * add).toLocaleDateString('sv', {timeZone: zone});
+        expect((await text(page, 'module')).includes(`Passed on ${day(0)}`) && (await text(page, 'module')).includes(`Due on ${day(30)}`), `the learner's own day: ${await text(page, 'module')}`);
+        expect_equal(await page.value('sonoplay.app.course.kept.state("look").told'), new Date().toISOString().slice(0, 10), 'kept in UTC');
         // A second tab only watches; it goes on when the first is closed.
         const second = await browser.page(800, 600, page.context);
         await second.open(address(own_server) + '?module=in-plane');
@@ -246,6 +277,54 @@ await run_tests({
         expect_equal(await page.value('location.search'), '?back', 'the way back');
         expect_equal(platform.verbs().join(), 'initialized,scored,scored,completed,passed,terminated', 'statements');
         expect_equal(platform.faults.join('\n'), '', 'rules of cmi5');
+        await page.close();
+    },
+    async a_cmi5_platform_that_does_not_answer_keeps_nobody_waiting() {
+        platform = new Cmi5Platform(address(server).slice(0, -1));
+        const page = await browser.page(800, 600);
+        let answers = false;
+        platform.hangs = (path) => path.startsWith('/fetch') && !answers;
+        await page.open(`${address(server)}cmi5/index.html?module=look&${platform.launch()}`);
+        await page.until('document.querySelectorAll("#module .stack button:enabled").length === 2');
+        expect((await text(page, 'course-notice')).includes('is being asked'), await text(page, 'course-notice'));
+        await answer(page, 1);
+        await attempt(page, true);
+        await page.value('document.getElementById("module-begin").focus()');
+        answers = true;
+        // Sooner than the 20 s after which the page itself gives up.
+        for (const response of platform.held) response.writeHead(503).end();
+        await page.until('document.getElementById("course-notice").textContent.includes("does not answer")');
+        await page.value('dispatchEvent(new Event("online"))');
+        await page.until('sonoplay.app.course.platform.has_state && sonoplay.app.course.platform.waiting() === 0');
+        await page.until('document.getElementById("course-notice").textContent === ""');
+        expect_equal(platform.verbs().join(), 'initialized,scored', 'what was done meanwhile is handed over');
+        expect_equal(await page.value('document.activeElement.id'), 'module-begin', 'whoever is at a button stays there');
+        expect_equal(platform.faults.join('\n'), '', 'rules of cmi5');
+        await page.close();
+    },
+    async a_package_speaks_the_language_that_its_platform_names() {
+        platform = new Cmi5Platform(address(server).slice(0, -1));
+        platform.documents.set('cmi5LearnerPreferences', '{"languagePreference":"de-DE,en"}');
+        const page = await browser.page(800, 600), url = `${address(server)}cmi5/index.html?module=look&${platform.launch()}`;
+        await page.open(url);
+        // The page is loaded again, and nothing can be asked of it just then.
+        const german = 'document.documentElement.lang === "de" && document.getElementById("module-begin") && sonoplay.app.course.platform.has_state';
+        for (let tries = 0; tries < 5; ++tries) {
+            try {
+                await page.until(german);
+                break;
+            } catch (error) {
+                if (!/navigated|context/.test(error.message)) throw error;
+            }
+        }
+        expect_equal(await text(page, 'module-begin'), 'Üben', 'German');
+        expect_equal(platform.verbs().join(), 'initialized', 'one session');
+        expect_equal(platform.faults.join('\n'), '', 'rules of cmi5');
+        // The learner's own choice on this page goes first.
+        await page.value('localStorage.setItem("sonocase-language", "en")');
+        await page.open(`${address(server)}cmi5/index.html?module=look&${platform.launch()}`);
+        await page.until('document.getElementById("module-begin") && sonoplay.app.course.platform.has_state');
+        expect_equal(await page.value('document.documentElement.lang'), 'en', 'English');
         await page.close();
     },
 });
