@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// core_write_case BUNDLE SESSION [flow|procedure|lesion|titled]: a small case (in whose vessel blood
-// flows; with a second exercise that is a procedure, or has a cyst beside the vessel; with a title
-// that is not its name), and a session of three seconds in which the probe slides over it and a
-// needle goes in.
+// core_write_case BUNDLE SESSION [flow|procedure|lesion|titled]: a small case (in whose vessel
+// blood flows; with a second exercise that is a procedure, or has a cyst beside the vessel; with a
+// title that is not its name), and a session of three seconds in which the probe slides over it and
+// a needle goes in.
 #include <cstdint>
 #include <fstream>
 #include <string>
