@@ -18,6 +18,7 @@
 
 #include "formats/base/build_facts.h"
 #include "formats/text/nearest_name.h"
+#include "runtime/imaging/core/control_limits.h"
 #include "runtime/player/headless/make_dataset.h"
 #include "runtime/player/headless/run_headless.h"
 #include "runtime/player/session/arguments.h"
@@ -41,6 +42,11 @@ std::vector<std::string> split(const std::string& list) {
         if (!name.empty()) names.push_back(name);
     }
     return names;
+}
+
+template <class T>
+CLI::Range within(Limits<T> limits) {
+    return {limits.min, limits.max};
 }
 
 // The options of the Doppler modes.
@@ -67,39 +73,39 @@ struct DopplerOptions {
             ->group("Doppler");
         angle = app.add_option("--angle", doppler.angle_deg,
                                "Angle cursor, degrees; default: along the vessel of the gate")
-                    ->check(CLI::Range(-80.0, 80.0))
+                    ->check(within(kAngleDegLimits))
                     ->group("Doppler");
         steer = app.add_option("--steer", doppler.steer_deg,
                                "Steering of a linear probe's lines, degrees; default: 20 to the "
                                "side where the vessel's angle is least")
-                    ->check(CLI::Range(-30.0, 30.0))
+                    ->check(within(kSteerDegLimits))
                     ->group("Doppler");
         app.add_option("--scale", doppler.scale_cm_s, "Nyquist velocity of the colour box, cm/s")
-            ->check(CLI::Range(1.0, 500.0))
+            ->check(within(kScaleCmSLimits))
             ->group("Doppler");
         spectral_scale = app.add_option("--spectral-scale", doppler.spectral_scale_cm_s,
                                         "Nyquist velocity of the spectrum, cm/s; default: by the "
                                         "fastest blood of the vessel aimed at, else 100")
-                             ->check(CLI::Range(1.0, 1000.0))
+                             ->check(within(kSpectralScaleCmSLimits))
                              ->group("Doppler");
         app.add_option("--baseline", doppler.baseline, "Shift of velocity 0, part of the scale")
-            ->check(CLI::Range(-0.9, 0.9))
+            ->check(within(kBaselineLimits))
             ->group("Doppler");
         app.add_option("--wall-filter", doppler.wall_filter, "Cut-off, part of the scale")
-            ->check(CLI::Range(0.0, 0.5))
+            ->check(within(kWallFilterLimits))
             ->group("Doppler");
         app.add_option("--doppler-gain", doppler.gain_db, "dB")
-            ->check(CLI::Range(-30.0, 30.0))
+            ->check(within(kDopplerGainDbLimits))
             ->group("Doppler");
         app.add_option("--priority", doppler.priority, "Grey above this part of white stays grey")
-            ->check(CLI::Range(0.0, 1.0))
+            ->check(within(kPriorityLimits))
             ->group("Doppler");
         app.add_option("--ensemble", doppler.ensemble, "Pulses of a colour line")
-            ->check(CLI::Range(4, 16))
+            ->check(within(kEnsembleLimits))
             ->group("Doppler");
         app.add_option("--diameter", doppler.diameter_mm,
                        "Of the vessel as measured, mm, for volume flow")
-            ->check(CLI::Range(0.1, 60.0))
+            ->check(within(kDiameterMmLimits))
             ->group("Doppler");
         app.add_option("--sound", arguments.sound,
                        "Headless: WAV file for the sound of the spectrum")
@@ -235,14 +241,14 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
         ->check(CLI::IsMember({"fast", "reference"}))
         ->group("Picture");
     app.add_option("--scanlines", arguments.scanlines, "Beams; default: the model's")
-        ->check(CLI::Range(8, 2048))
+        ->check(within(kScanlineLimits))
         ->group("Picture");
     app.add_option("--samples", arguments.samples, "Samples along a beam; default: the model's")
-        ->check(CLI::Range(16, 4096))
+        ->check(within(kSampleLimits))
         ->group("Picture");
     app.add_option("--looks", arguments.looks,
                    "Speckle fields that are averaged; default: the machine's")
-        ->check(CLI::Range(1, 16))
+        ->check(within(kLookLimits))
         ->group("Picture");
     app.add_option("--frame-budget", arguments.frame_budget_ms,
                    "In a window: milliseconds per frame above which accuracy is reduced; "
@@ -252,12 +258,12 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
     app.add_option("--press", arguments.press_mm,
                    "Millimetres by which the probe presses deeper than its pose; default: the "
                    "exercise's")
-        ->check(CLI::Range(0.0, 40.0))
+        ->check(within(kPressMmLimits))
         ->group("Picture");
     DopplerOptions doppler;
     doppler.add(app, arguments);
     app.add_option("--threads", arguments.threads, "Rendering threads")
-        ->check(CLI::Range(1, 256))
+        ->check(within(kThreadLimits))
         ->group("Picture");
     app.add_option(
         "--serve", arguments.serve,
@@ -329,7 +335,8 @@ int run_dataset_command(int argc, char** argv) {
     app.add_option("--frames", arguments.frames, "Frames of the whole data set")
         ->required()
         ->check(CLI::Range(1, 100000000));
-    app.add_option("--seed", arguments.seed, "Of all that is drawn; default: 1");
+    app.add_option("--seed", arguments.seed, "Of all that is drawn, from 0 on; default: 1")
+        ->check(CLI::NonNegativeNumber);
     app.add_option("--shard", shard, "I/N: the I-th of N parts, I from 1; default: 1/1");
     try {
         app.parse(argc, argv);

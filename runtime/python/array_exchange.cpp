@@ -10,6 +10,8 @@
 #include <type_traits>
 #include <utility>
 
+#include <pybind11/stl.h>
+
 namespace sonocase::python {
 namespace {
 
@@ -537,10 +539,19 @@ void bind_array(py::module_& module) {
         "Numbers in main memory, in C order: what functions give where NumPy cannot be imported. "
         "NumPy, torch and others see it without a copy, by the buffer protocol, "
         "__array_interface__ or DLPack.")
-        .def(py::init([make](const py::object& shape, const std::string& dtype) {
+        .def(py::init([make](const py::object& shape, const py::object& dtype) {
+                 if (!py::isinstance<py::sequence>(shape) || py::isinstance<py::str>(shape))
+                     throw py::type_error("shape: give a tuple of whole numbers");
+                 if (!py::isinstance<py::str>(dtype))
+                     throw py::type_error("dtype: give its name, as 'uint8'");
                  Shape of;
-                 for (const py::handle n : py::tuple(shape)) of.push_back(py::cast<py::ssize_t>(n));
-                 return make(of, dtype);
+                 for (const py::handle n : shape) {
+                     of.push_back(PyNumber_AsSsize_t(n.ptr(), PyExc_OverflowError));
+                     if (PyErr_Occurred() == nullptr) continue;
+                     const std::string said = raised_text();
+                     throw py::type_error("shape: " + said + "; give a tuple of whole numbers");
+                 }
+                 return make(of, py::cast<std::string>(dtype));
              }),
              "shape"_a, "dtype"_a = "uint8", "Zeros.")
         .def_buffer([](Array& a) {
@@ -559,9 +570,25 @@ void bind_array(py::module_& module) {
         .def("__dlpack__", to_dlpack, py::kw_only(), "stream"_a = py::none(),
              "max_version"_a = py::none(), "dl_device"_a = py::none(), "copy"_a = py::none())
         .def("__dlpack_device__", [](const Array&) { return py::make_tuple(dlpack::kCpu, 0); })
-        .def_property_readonly("shape", [](const Array& a) { return tuple_of(a.shape); })
-        .def_property_readonly("dtype", [](const Array& a) { return a.element->name; })
-        .def_property_readonly("nbytes", [](const Array& a) { return a.bytes(); })
+        .def_property_readonly(
+            "shape", [](const Array& a) { return tuple_of(a.shape); }, "Length of each axis.")
+        .def_property_readonly(
+            "dtype", [](const Array& a) { return a.element->name; }, "Name, as 'uint8'.")
+        .def_property_readonly(
+            "nbytes", [](const Array& a) { return a.bytes(); }, "Bytes of all its numbers.")
+        .def(py::pickle(
+            [](const Array& a) {
+                return py::make_tuple(tuple_of(a.shape), a.element->name,
+                                      py::bytes(a.memory.get(), a.bytes()));
+            },
+            [make](const py::tuple& t) {
+                Array array = make(py::cast<Shape>(t[0]), py::cast<std::string>(t[1]));
+                const auto content = py::cast<std::string>(t[2]);
+                if (content.size() != array.bytes())
+                    throw py::value_error("array: a pickle of another length");
+                std::memcpy(array.memory.get(), content.data(), content.size());
+                return array;
+            }))
         .def("__len__",
              [](const Array& a) {
                  if (a.shape.empty()) throw py::type_error("an array of shape () has no length");

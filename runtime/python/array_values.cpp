@@ -22,16 +22,95 @@ Vector3 triple(py::handle value, const char* name) {
 
 }  // namespace
 
-std::string absolute_path(const std::string& path) {
-    return py::cast<std::string>(py::module_::import("os.path").attr("abspath")(path));
+double in_range(double value, const std::string& name, double min, double max) {
+    if (value >= min && value <= max) return value;
+    char text[96];
+    std::snprintf(text, sizeof text, ": %.10g is out of range: give %.10g to %.10g", value, min,
+                  max);
+    throw py::value_error(name + text);
 }
 
-double in_range(double value, const char* name, double min, double max) {
-    if (value >= min && value <= max) return value;
-    char text[160];
-    std::snprintf(text, sizeof text, "%s: %.6g is out of range: give %.6g to %.6g", name, value,
-                  min, max);
-    throw py::value_error(text);
+namespace {
+
+[[noreturn]] void refuse_type(py::handle value, const std::string& name, const char* expected) {
+    throw py::type_error(name + ": of type " + Py_TYPE(value.ptr())->tp_name + "; give " +
+                         expected);
+}
+
+// After a call of Python's that may have raised: TypeError, or ValueError where it was a number
+// that is too large.
+void refuse_raised(py::handle value, const std::string& name, const char* expected) {
+    if (PyErr_Occurred() == nullptr) return;
+    const bool large = PyErr_ExceptionMatches(PyExc_OverflowError) != 0;
+    PyErr_Clear();
+    if (large) throw py::value_error(name + ": the number is too large");
+    refuse_type(value, name, expected);
+}
+
+}  // namespace
+
+double number_from(py::handle value, const std::string& name) {
+    const double number = PyFloat_AsDouble(value.ptr());
+    refuse_raised(value, name, "a number");
+    return number;
+}
+
+double number_within(py::handle value, const std::string& name, runtime::Limits<double> limits) {
+    return in_range(number_from(value, name), name, limits.min, limits.max);
+}
+
+std::int64_t whole_within(py::handle value,
+                          const std::string& name,
+                          std::int64_t min,
+                          std::int64_t max) {
+    const auto whole = py::reinterpret_steal<py::object>(PyNumber_Index(value.ptr()));
+    refuse_raised(value, name, "a whole number");
+    const long long number = PyLong_AsLongLong(whole.ptr());
+    refuse_raised(value, name, "a whole number");
+    (void)in_range(static_cast<double>(number), name, static_cast<double>(min),
+                   static_cast<double>(max));
+    return number;
+}
+
+std::string text_from(py::handle value, const std::string& name) {
+    if (!py::isinstance<py::str>(value)) refuse_type(value, name, "text");
+    py::ssize_t size = 0;
+    const char* text = PyUnicode_AsUTF8AndSize(value.ptr(), &size);
+    if (text == nullptr) {
+        PyErr_Clear();
+        throw py::value_error(name + ": holds a character that has no UTF-8; give plain text");
+    }
+    return {text, static_cast<std::size_t>(size)};
+}
+
+std::vector<std::string> names_from(py::handle value, const std::string& name) {
+    if (!py::isinstance<py::iterable>(value) || py::isinstance<py::str>(value))
+        refuse_type(value, name, "a list of names");
+    std::vector<std::string> names;
+    for (const py::handle one : value) names.push_back(text_from(one, name));
+    return names;
+}
+
+std::string path_from(py::handle value, const std::string& name) {
+    PyObject* bytes = nullptr;
+    if (PyUnicode_FSConverter(value.ptr(), &bytes) == 0) {
+        const bool is_path = PyErr_ExceptionMatches(PyExc_TypeError) == 0;
+        PyErr_Clear();
+        if (is_path)
+            throw py::value_error(name + ": holds a character that no file's name has, as NUL");
+        refuse_type(value, name, "a path: text, bytes or os.PathLike");
+    }
+    return py::cast<std::string>(py::reinterpret_steal<py::bytes>(bytes));
+}
+
+py::str path_text(const std::string& path) {
+    return py::reinterpret_steal<py::str>(
+        PyUnicode_DecodeFSDefaultAndSize(path.data(), static_cast<py::ssize_t>(path.size())));
+}
+
+void raise_value_error(const std::string& text) {
+    PyErr_SetObject(PyExc_ValueError, path_text(text).ptr());
+    throw py::error_already_set();
 }
 
 Rigid rigid_from(const double* rows, const std::string& name) {
@@ -105,10 +184,11 @@ void set_dent(py::handle dent, runtime::FrameInput& input, const char* name) {
     const Numbers mm = numbers_from(dent, name);
     if (mm.shape != Shape{2})
         throw py::value_error(std::string(name) + ": give two numbers, tent_mm and drag_mm");
-    if (!std::isfinite(mm.values[0]) || !std::isfinite(mm.values[1]))
-        throw py::value_error(std::string(name) + ": not finite");
-    input.needle.tent_mm = mm.values[0];
-    input.needle.drag_mm = mm.values[1];
+    const auto within = [&](int i) {
+        return in_range(mm.values[i], name, runtime::kDentMmLimits.min, runtime::kDentMmLimits.max);
+    };
+    input.needle.tent_mm = within(0);
+    input.needle.drag_mm = within(1);
 }
 
 void copy_rows(const Rigid& pose, double* rows) {

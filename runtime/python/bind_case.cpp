@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
+#include <array>
+
 #include <pybind11/stl.h>
 
 #include "array_values.h"
@@ -62,24 +64,25 @@ std::vector<int> labels_at(const OpenedCase& opened, py::handle points) {
     return labels;
 }
 
-std::string score_text(const OpenedCase& opened,
-                       const std::string& session_path,
-                       const CaseExercise* given) {
+std::string score_text(const OpenedCase& opened, py::handle session, const CaseExercise* given) {
     const CaseBundle& bundle = bundle_of(opened);
+    const std::string session_path = path_from(session, "session");
+    if (given != nullptr) check_of(*given, opened);
     const py::gil_scoped_release free_to_run;
     const Sequence sequence = value_of(load_recording_file(session_path));
-    const Session session =
+    const Session recorded =
         value_of(session_from_sequence(sequence, guess_names(sequence), session_path));
-    (void)value_of(check_session(session, session_path));
+    (void)value_of(check_session(recorded, session_path));
     const Exercise* chosen = given;  // null: that of the recording
     const Exercise exercise =
-        chosen != nullptr ? *chosen : value_of(exercise_named(opened, session.header.exercise));
-    const CaseAnatomy anatomy(opened.bundle, breathing_shown(exercise, session.header));
-    return score_json(score_session(session, exercise, &anatomy, bundle.labels), exercise);
+        chosen != nullptr ? *chosen : value_of(exercise_named(opened, recorded.header.exercise));
+    const CaseAnatomy anatomy(opened.bundle, breathing_shown(exercise, recorded.header));
+    return score_json(score_session(recorded, exercise, &anatomy, bundle.labels), exercise);
 }
 
 // Poses and times of a recorded session.
-py::dict read_session(const std::string& path) {
+py::dict read_session(py::handle file) {
+    const std::string path = path_from(file, "path");
     const Sequence sequence = value_of(load_recording_file(path));
     const Session session = value_of(session_from_sequence(sequence, guess_names(sequence), path));
     const auto count = static_cast<py::ssize_t>(session.samples.size());
@@ -96,8 +99,9 @@ py::dict read_session(const std::string& path) {
         copy_rows(sample.mannequin_from_probe, probe.data + 16 * n);
         copy_rows(sample.mannequin_from_drawn, needle.data + 16 * n);
     }
-    return py::dict("exercise"_a = session.header.exercise, "case"_a = session.header.case_name,
-                    "render"_a = session.header.render, "time_s"_a = time_s.object,
+    return py::dict("exercise"_a = path_text(session.header.exercise),
+                    "case"_a = path_text(session.header.case_name),
+                    "render"_a = path_text(session.header.render), "time_s"_a = time_s.object,
                     "frame"_a = frame.object, "probe_ok"_a = probe_ok.object,
                     "mannequin_from_probe"_a = probe.object, "needle_ok"_a = needle_ok.object,
                     "mannequin_from_drawn_needle"_a = needle.object);
@@ -105,12 +109,20 @@ py::dict read_session(const std::string& path) {
 
 void bind_label(py::module_& module) {
     py::class_<Label>(module, "Label", "One entry of a case's palette.")
-        .def_readonly("name", &Label::name)
-        .def_readonly("tissue", &Label::tissue)
+        .def_readonly("name", &Label::name, "Unique within the palette, as 'liver'.")
+        .def_readonly("tissue", &Label::tissue, "What it is made of, as 'blood'.")
         .def_property_readonly(
             "colour",
             [](const Label& l) { return py::make_tuple(l.colour[0], l.colour[1], l.colour[2]); },
             "sRGB, 0 to 255.")
+        .def(py::pickle(
+            [](const Label& l) {
+                return py::make_tuple(l.name, l.tissue, l.source_value, l.colour);
+            },
+            [](const py::tuple& t) {
+                return Label{py::cast<std::string>(t[0]), py::cast<std::string>(t[1]),
+                             py::cast<int>(t[2]), py::cast<std::array<std::uint8_t, 3>>(t[3])};
+            }))
         .def("__repr__",
              [](const Label& l) { return "<sonocase.Label " + l.name + " (" + l.tissue + ")>"; });
 }
@@ -122,37 +134,49 @@ void bind_case(py::module_& module) {
     py::class_<OpenedCase, Shared>(module, "Case", "A case bundle, opened with Case.open(path).")
         .def_static(
             "open",
-            [](const py::object& path) {
-                const auto text =
-                    py::cast<std::string>(py::module_::import("os").attr("fspath")(path));
+            [](py::handle path) {
+                const std::string name = path_from(path, "path");
                 const py::gil_scoped_release free_to_run;
-                return value_of(open_case(text));
+                return value_of(open_case(name));
             },
             "path"_a, "Opens a bundle; raises sonocase.Error where it is none.")
         .def(
             "close", [](OpenedCase& c) { c.closed = true; },
             "Ends the use of the case: it, and renderers made from it, raise from then on.")
-        .def_property_readonly("closed", [](const OpenedCase& c) { return c.closed.load(); })
-        .def("__enter__", [](Shared c) { return c; })
+        .def_property_readonly(
+            "closed", [](const OpenedCase& c) { return c.closed.load(); },
+            "Whether close() has been called.")
+        .def("__enter__", [](const py::object& self) { return self; })
         .def("__exit__", [](OpenedCase& c, const py::args&) { c.closed = true; })
-        .def_readonly("path", &OpenedCase::path)
-        .def_readonly("warnings", &OpenedCase::warnings, "Whole sentences.")
-        .def_property_readonly("name",
-                               [](const OpenedCase& c) { return bundle_of(c).manifest.case_name; })
+        .def_property_readonly(
+            "path", [](const OpenedCase& c) { return path_text(c.path); },
+            "As it was given to open(), as os.fsdecode has it.")
+        .def_property_readonly(
+            "warnings",
+            [](const OpenedCase& c) {
+                py::list warnings;
+                for (const std::string& warning : c.warnings) warnings.append(path_text(warning));
+                return warnings;
+            },
+            "Whole sentences, about exercises that could not be read.")
+        .def_property_readonly(
+            "name", [](const OpenedCase& c) { return bundle_of(c).manifest.case_name; },
+            "Of the patient, as the recipe has it.")
         .def_property_readonly(
             "labels", [](const OpenedCase& c) { return bundle_of(c).labels; },
             "List of Label; an index in truth arrays is an index into it, 0 is outside the body.")
-        .def_property_readonly("exercises",
-                               [](const OpenedCase& c) {
-                                   std::vector<CaseExercise> exercises;
-                                   for (const Exercise& e : c.exercises)
-                                       exercises.push_back({e, c.path});
-                                   return exercises;
-                               })
+        .def_property_readonly(
+            "exercises",
+            [](const OpenedCase& c) {
+                std::vector<CaseExercise> exercises;
+                for (const Exercise& e : c.exercises) exercises.push_back({e, c.absolute});
+                return exercises;
+            },
+            "List of Exercise, those of the bundle that could be read.")
         .def(
             "exercise",
             [](const OpenedCase& c, const std::string& name) {
-                return CaseExercise{value_of(exercise_named(c, name)), c.path};
+                return CaseExercise{value_of(exercise_named(c, name)), c.absolute};
             },
             "name"_a = "", "By name; the first by default.")
         .def_property_readonly(
@@ -162,8 +186,9 @@ void bind_case(py::module_& module) {
                 return py::make_tuple(s.x, s.y, s.z);
             },
             "Voxels along x, y, z.")
-        .def_property_readonly("voxel_mm",
-                               [](const OpenedCase& c) { return bundle_of(c).grid.spacing_mm.x; })
+        .def_property_readonly(
+            "voxel_mm", [](const OpenedCase& c) { return bundle_of(c).grid.spacing_mm.x; },
+            "Side of a voxel.")
         .def_property_readonly(
             "origin_mm", [](const OpenedCase& c) { return array_of(bundle_of(c).grid.origin_mm); },
             "Centre of voxel (0, 0, 0), frame `mannequin`; shape (3,).")
@@ -180,11 +205,11 @@ void bind_case(py::module_& module) {
         .def(py::pickle(
             [](const OpenedCase& c) {
                 check(usable(c));
-                return py::make_tuple(absolute_path(c.path));
+                return py::make_tuple(path_text(c.absolute));
             },
-            [](const py::tuple& t) { return value_of(open_case(py::cast<std::string>(t[0]))); }))
+            [](const py::tuple& t) { return value_of(open_case(path_from(t[0], "path"))); }))
         .def("__repr__", [](const OpenedCase& c) {
-            return "<sonocase.Case " + c.path + (c.closed ? ", closed>" : ">");
+            return path_text("<sonocase.Case " + c.path + (c.closed ? ", closed>" : ">"));
         });
     module.def("read_session", read_session, "path"_a,
                "Poses, times and frame numbers of a recorded session, as a dict of arrays.");

@@ -176,32 +176,52 @@ void bind_needle(py::module_& module) {
 
 void bind_target(py::module_& module) {
     py::class_<Target>(module, "Target", "What an exercise asks the needle to reach.")
-        .def_readonly("name", &Target::name)
+        .def_readonly("name", &Target::name, "As the exercise's file has it.")
         .def_property_readonly(
             "centre_mm", [](const Target& t) { return array_of(t.centre); },
             "Frame `mannequin`, at rest; shape (3,).")
-        .def_readonly("radius_mm", &Target::radius_mm)
+        .def_readonly("radius_mm", &Target::radius_mm, "Of the target itself.")
         .def_readonly("hit_radius_mm", &Target::hit_radius_mm,
                       "A tip as near as this to the centre is a hit.")
         .def_readonly("inside", &Target::inside, "Label that it lies in; '': any.")
+        .def(py::pickle(
+            [](const Target& t) {
+                return py::make_tuple(t.name, t.centre.x, t.centre.y, t.centre.z, t.radius_mm,
+                                      t.hit_radius_mm, t.inside);
+            },
+            [](const py::tuple& t) {
+                const auto at = [&](int i) { return py::cast<double>(t[i]); };
+                Target target;  // what Python sees of it
+                target.name = py::cast<std::string>(t[0]);
+                target.centre = {at(1), at(2), at(3)};
+                target.radius_mm = at(4);
+                target.hit_radius_mm = at(5);
+                target.inside = py::cast<std::string>(t[6]);
+                return target;
+            }))
         .def("__repr__", [](const Target& t) { return "<sonocase.Target " + t.name + ">"; });
 }
 
 py::tuple exercise_state(const CaseExercise& e) {
-    return py::make_tuple(absolute_path(e.case_path), e.name, state_of(e.probe),
-                          state_of(e.needle));
+    return py::make_tuple(path_text(e.case_path), e.name, state_of(e.probe), state_of(e.needle));
 }
 
 CaseExercise exercise_of_state(const py::tuple& t) {
-    const auto path = py::cast<std::string>(t[0]);
-    const auto opened = value_of(open_case(path));
-    CaseExercise exercise{value_of(exercise_named(*opened, py::cast<std::string>(t[1]))), path};
+    const auto opened = value_of(open_case(path_from(t[0], "path")));
+    CaseExercise exercise{value_of(exercise_named(*opened, py::cast<std::string>(t[1]))),
+                          opened->absolute};
     exercise.probe = probe_of_state(t[2]);
     exercise.needle = needle_of_state(t[3]);
     return exercise;
 }
 
 }  // namespace
+
+void check_of(const CaseExercise& exercise, const OpenedCase& opened) {
+    if (!is_of(exercise, opened))
+        raise_value_error("exercise: " + exercise.name + " is of the case " + exercise.case_path +
+                          ", not of " + opened.absolute + "; give one of this case, or its name");
+}
 
 void bind_exercise(py::module_& module) {
     bind_probe(module);
@@ -210,20 +230,22 @@ void bind_exercise(py::module_& module) {
     py::class_<CaseExercise>(module, "Exercise",
                              "Probe, needle, targets and motion of one exercise. Probe and needle "
                              "may be changed before a Renderer is made.")
-        .def_readonly("name", &Exercise::name)
-        .def_readonly("title", &Exercise::title)
-        .def_readonly("description", &Exercise::description)
-        .def_readonly("kind", &Exercise::kind)
-        .def_readonly("difficulty", &Exercise::difficulty)
-        .def_readonly("model", &Exercise::model)
-        .def_readonly("effects", &Exercise::effects)
+        .def_readonly("name", &Exercise::name, "By which Case.exercise() finds it.")
+        .def_readonly("title", &Exercise::title, "As the window shows it.")
+        .def_readonly("description", &Exercise::description, "What the trainee is asked to do.")
+        .def_readonly("kind", &Exercise::kind, "As its file has it, as 'scan' (docs/format.md).")
+        .def_readonly("difficulty", &Exercise::difficulty, "1 (easy) to 5 (hard).")
+        .def_readonly("model", &Exercise::model, "Image model: 'physical' or 'paper'.")
+        .def_readonly("effects", &Exercise::effects, "As on sonoplay's command line.")
         .def_property(
             "probe", [](CaseExercise& e) -> Probe& { return e.probe; },
-            [](CaseExercise& e, const Probe& p) { e.probe = p; })
+            [](CaseExercise& e, const Probe& p) { e.probe = p; },
+            "Its Probe, which may be changed.")
         .def_property(
             "needle", [](CaseExercise& e) -> NeedleModel& { return e.needle; },
-            [](CaseExercise& e, const NeedleModel& n) { e.needle = n; })
-        .def_readonly("targets", &Exercise::targets)
+            [](CaseExercise& e, const NeedleModel& n) { e.needle = n; },
+            "Its Needle, which may be changed.")
+        .def_readonly("targets", &Exercise::targets, "List of Target.")
         .def_readonly("no_go", &Exercise::no_go, "Labels that the needle must not touch.")
         .def_property_readonly(
             "start_pose", [](const CaseExercise& e) { return array_of(start_pose(e)); },
@@ -249,12 +271,14 @@ void bind_exercise(py::module_& module) {
                 throw py::key_error("no sweep named " + name + " in exercise " + e.name);
             },
             "name"_a, "The key poses of a scripted sweep, each (4, 4), mm.")
-        .def_property_readonly("sweeps",
-                               [](const CaseExercise& e) {
-                                   py::list names;
-                                   for (const Sweep& sweep : e.sweeps) names.append(sweep.name);
-                                   return names;
-                               })
+        .def_property_readonly(
+            "sweeps",
+            [](const CaseExercise& e) {
+                py::list names;
+                for (const Sweep& sweep : e.sweeps) names.append(sweep.name);
+                return names;
+            },
+            "Names of its scripted sweeps; see sweep_poses().")
         .def(py::pickle(&exercise_state, &exercise_of_state))
         .def("__repr__",
              [](const CaseExercise& e) { return "<sonocase.Exercise " + e.name + ">"; });

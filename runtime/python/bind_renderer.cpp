@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <tuple>
 #include <vector>
 
 #include <pybind11/stl.h>
@@ -20,8 +21,9 @@
 
 namespace sonocase::python {
 
-void set_scalars(double time_s, std::int64_t frame, runtime::FrameInput& input);
-void set_console(double gain_db, double dynamic_range_db, runtime::FrameInput& input);
+void set_time(double time_s, runtime::FrameInput& input);
+std::int64_t frame_from(py::handle frame, const char* name);
+void set_console(py::handle gain_db, py::handle dynamic_range_db, runtime::FrameInput& input);
 void set_press(double press_mm, runtime::FrameInput& input);
 
 // One task per pose. poses: (n, 4, 4); needles, times_s: None, or one per pose.
@@ -34,23 +36,24 @@ void press_batch(const py::object& press_mm, std::vector<FrameTask>& tasks);
 // None, or a pair or None per frame.
 void dent_batch(py::handle dents, std::vector<FrameTask>& tasks);
 
-void set_console(double gain_db, double dynamic_range_db, runtime::FrameInput& input) {
-    if (!std::isfinite(gain_db)) throw py::value_error("gain_db: not finite");
-    input.settings.gain_db = gain_db;
-    input.settings.dynamic_range_db = in_range(dynamic_range_db, "dynamic_range_db", 20, 120);
+void set_console(py::handle gain_db, py::handle dynamic_range_db, runtime::FrameInput& input) {
+    input.settings.gain_db = number_within(gain_db, "gain_db", runtime::kGainDbLimits);
+    input.settings.dynamic_range_db =
+        number_within(dynamic_range_db, "dynamic_range_db", runtime::kDynamicRangeDbLimits);
 }
 
-void set_scalars(double time_s, std::int64_t frame, runtime::FrameInput& input) {
+void set_time(double time_s, runtime::FrameInput& input) {
     if (!std::isfinite(time_s)) throw py::value_error("time_s: not finite");
-    if (frame < 0 || frame > std::numeric_limits<std::uint32_t>::max())
-        throw py::value_error("frame: give 0 to 2^32 - 1");
     input.time_s = time_s;
-    input.frame = static_cast<std::uint32_t>(frame);
+}
+
+std::int64_t frame_from(py::handle frame, const char* name) {
+    return whole_within(frame, name, 0, std::numeric_limits<std::uint32_t>::max());
 }
 
 void set_press(double press_mm, runtime::FrameInput& input) {
-    if (!(press_mm >= 0 && press_mm <= 40)) throw py::value_error("press_mm: give 0 to 40");
-    input.settings.press_mm = press_mm;
+    constexpr runtime::Limits<double> kLimits = runtime::kPressMmLimits;
+    input.settings.press_mm = in_range(press_mm, "press_mm", kLimits.min, kLimits.max);
 }
 
 void press_batch(const py::object& press_mm, std::vector<FrameTask>& tasks) {
@@ -98,8 +101,11 @@ std::vector<FrameTask> batch_tasks(py::handle poses,
         input.mannequin_from_probe =
             rigid_from(rows.values.data() + 16 * n, "poses[" + std::to_string(n) + "]");
         if (!needles.is_none()) set_needle(py::object(needle_of[n]), input);
-        set_scalars(times ? times->values[n] : 0, first_frame + static_cast<std::int64_t>(n),
-                    input);
+        set_time(times ? times->values[n] : 0, input);
+        const std::int64_t frame = first_frame + static_cast<std::int64_t>(n);
+        (void)in_range(static_cast<double>(frame), "first_frame and what follows", 0,
+                       std::numeric_limits<std::uint32_t>::max());
+        input.frame = static_cast<std::uint32_t>(frame);
     }
     return tasks;
 }
@@ -160,8 +166,8 @@ class PyRenderer {
     py::ssize_t width() const { return request_.width_px; }
     py::ssize_t height() const { return request_.height_px; }
     const Request& request() const { return request_; }
-    bool contact() const { return contact_; }
-    py::dict press() const { return press_of(press_); }
+    bool contact() const { return !shown_ || shown_->contact; }
+    py::dict press() const { return press_of(shown_ ? shown_->press : runtime::PressReport{}); }
 
     // Raises once the renderer or its case is closed.
     FrameRenderer& inner() const {
@@ -178,24 +184,33 @@ class PyRenderer {
 
     py::object render(py::handle pose,
                       py::handle needle,
-                      double time_s,
-                      std::int64_t frame,
-                      double gain_db,
-                      double dynamic_range_db,
-                      double press_mm,
+                      py::handle time_s,
+                      py::handle frame,
+                      py::handle gain_db,
+                      py::handle dynamic_range_db,
+                      py::handle press_mm,
                       py::handle dent,
                       const py::object& out,
-                      const std::string& mode,
-                      const py::dict& doppler) {
+                      py::handle mode,
+                      py::handle doppler) {
         FrameTask task;
         task.input.mannequin_from_probe = rigid_from(pose, "pose");
         set_needle(needle, task.input);
-        set_scalars(time_s, frame, task.input);
+        set_time(number_from(time_s, "time_s"), task.input);
+        task.input.frame = static_cast<std::uint32_t>(frame_from(frame, "frame"));
         set_console(gain_db, dynamic_range_db, task.input);
-        set_press(press_mm, task.input);
+        set_press(number_from(press_mm, "press_mm"), task.input);
         set_dent(dent, task.input, "dent");
-        mode_ = doppler_mode(mode);
-        if (mode_ != runtime::DopplerMode::off) return render_doppler(task, doppler, out);
+        if (!py::isinstance<py::dict>(doppler))
+            throw py::type_error("doppler: give a dict of settings by name");
+        const auto given = py::reinterpret_borrow<py::dict>(doppler);
+        runtime::DopplerSettings asked;
+        asked.mode = doppler_mode(text_from(mode, "mode"));
+        apply_doppler(given, asked);
+        if (asked.mode != runtime::DopplerMode::off) {
+            task.input.settings.doppler = asked;
+            return render_doppler(task, given, out);
+        }
         const Pixels picture(out, {height(), width()});
         task.pixels = {picture.data, static_cast<std::size_t>(width() * height())};
         const Turn turn(busy_);
@@ -206,9 +221,7 @@ class PyRenderer {
             renderer.render(task);
         }
         check(usable(renderer.opened()));
-        contact_ = task.status != runtime::FrameStatus::no_contact;
-        press_ = task.press;
-        last_ = task.input;
+        keep(task);
         return picture.object;
     }
 
@@ -220,17 +233,22 @@ class PyRenderer {
         return aim_of(renderer.aimed(rigid_from(pose, "pose"), {}, true));
     }
 
-    py::dict doppler() const {
-        if (mode_ == runtime::DopplerMode::off)
+    py::dict doppler() {
+        const Turn turn(busy_);
+        const FrameRenderer& renderer = inner();
+        const runtime::DopplerMode mode =
+            shown_ ? shown_->input.settings.doppler.mode : runtime::DopplerMode::off;
+        if (mode == runtime::DopplerMode::off)
             throw std::runtime_error("renderer: the last frame was of no Doppler mode");
-        return measures_of(inner().doppler(), mode_, inner().opened().bundle->labels);
+        return measures_of(renderer.doppler(), mode, renderer.opened().bundle->labels);
     }
 
     // The last frame's: (planes, facts).
-    py::tuple truth(const std::vector<std::string>& names) {
+    py::tuple truth(py::handle names) {
         FrameTask task;
         task.input = last();
-        const TruthArrays arrays = TruthArrays::make(names, -1, height(), width());
+        const TruthArrays arrays =
+            TruthArrays::make(names_from(names, "planes"), -1, height(), width());
         task.planes = arrays.planes(0, width() * height());
         const Turn turn(busy_);
         FrameRenderer& renderer = inner();
@@ -247,16 +265,20 @@ class PyRenderer {
     py::object render_batch(py::handle poses,
                             py::handle needles,
                             py::handle times_s,
-                            std::int64_t first_frame,
-                            double gain_db,
-                            double dynamic_range_db,
+                            py::handle first_frame,
+                            py::handle gain_db,
+                            py::handle dynamic_range_db,
                             const py::object& press_mm,
                             py::handle dents,
                             const py::object& out,
-                            int threads,
-                            const std::optional<std::vector<std::string>>& truth) {
-        if (threads < 1 || threads > 256) throw py::value_error("threads: give 1 to 256");
-        std::vector<FrameTask> tasks = batch_tasks(poses, needles, times_s, first_frame);
+                            py::handle thread_count,
+                            py::handle truth_planes) {
+        const int threads = static_cast<int>(whole_within(
+            thread_count, "threads", runtime::kThreadLimits.min, runtime::kThreadLimits.max));
+        std::optional<std::vector<std::string>> truth;
+        if (!truth_planes.is_none()) truth = names_from(truth_planes, "truth");
+        std::vector<FrameTask> tasks =
+            batch_tasks(poses, needles, times_s, frame_from(first_frame, "first_frame"));
         for (FrameTask& task : tasks) {
             set_console(gain_db, dynamic_range_db, task.input);
         }
@@ -287,8 +309,7 @@ class PyRenderer {
         }
         if (!value_of(*whole)) throw py::error_already_set();  // Ctrl-C, as Python's own exception
         check(usable(renderer.opened()));
-        if (!tasks.empty()) last_ = tasks.back().input;
-        if (!tasks.empty()) press_ = tasks.back().press;
+        if (!tasks.empty()) keep(tasks.back());
         if (!truth) return pictures.object;
         py::list facts;
         for (const FrameTask& task : tasks)
@@ -298,14 +319,15 @@ class PyRenderer {
     }
 
     const runtime::FrameInput& last() const {
-        if (!last_) throw std::runtime_error("renderer: no frame has been rendered yet");
-        return *last_;
+        if (!shown_) throw std::runtime_error("renderer: no frame has been rendered yet");
+        return shown_->input;
     }
 
     // Of the last frame: name and why.
-    py::dict skipped_effects() const {
+    py::dict skipped_effects() {
+        const Turn turn(busy_);
         py::dict skipped;
-        for (const runtime::EffectCost& cost : inner().engine().renderer().costs())
+        for (const runtime::EffectCost& cost : inner().last_engine().renderer().costs())
             if (!cost.ran) skipped[cost.name] = cost.why;
         return skipped;
     }
@@ -333,25 +355,28 @@ class PyRenderer {
                                   "probe; give it in millimetres, not in metres");
     }
 
+    // The last frame that was drawn, or the last of a batch: what is said of it belongs together.
+    struct Shown {
+        runtime::FrameInput input;
+        bool contact;
+        runtime::PressReport press;
+    };
+    void keep(const FrameTask& task) {
+        shown_ = {task.input, task.status != runtime::FrameStatus::no_contact, task.press};
+    }
+
     py::object render_doppler(FrameTask& task, const py::dict& given, const py::object& out) {
         runtime::DopplerSettings& settings = task.input.settings.doppler;
         const Turn turn(busy_);
         FrameRenderer& renderer = inner();
         refuse_metres(task.input, "pose", "needle");
         check(renderer.prepare_doppler());
-        apply_doppler(given, settings);
-        const runtime::DopplerSettings aim =
-            renderer.aimed(task.input.mannequin_from_probe, settings, !given.contains("steer_deg"));
-        py::dict places = aim_of(aim);
-        for (const auto& key : {"box_left", "box_right", "box_top_mm", "box_bottom_mm"})
-            if (gives_box(given)) places.attr("pop")(key);
-        for (const auto& key : {"gate_line", "gate_depth_mm", "gate_mm", "angle_deg"})
-            if (gives_gate(given)) places.attr("pop")(key);
-        apply_doppler(places, settings);
-        apply_doppler(given, settings);
-        settings.mode = mode_;
-        if (last_) runtime::add_probe_motion(*last_, task.input);
-        const py::ssize_t rows = runtime::doppler_rows(mode_, static_cast<int>(height()));
+        take_aim(
+            given,
+            renderer.aimed(task.input.mannequin_from_probe, settings, !given.contains("steer_deg")),
+            settings);
+        if (shown_) runtime::add_probe_motion(shown_->input, task.input);
+        const py::ssize_t rows = runtime::doppler_rows(settings.mode, static_cast<int>(height()));
         const Pixels picture(out, {rows, width(), 3});
         std::vector<std::uint8_t> grey(width() * height());
         task.pixels = grey;
@@ -363,19 +388,14 @@ class PyRenderer {
             renderer.show_doppler(task, rgb);
         }
         check(usable(renderer.opened()));
-        contact_ = task.status != runtime::FrameStatus::no_contact;
-        press_ = task.press;
-        last_ = task.input;
+        keep(task);
         return picture.object;
     }
 
     std::unique_ptr<FrameRenderer> renderer_;  // null: closed
     Request request_;
     std::atomic<bool> busy_{false};
-    bool contact_ = true;
-    runtime::DopplerMode mode_ = runtime::DopplerMode::off;  // of the last frame
-    runtime::PressReport press_;
-    std::optional<runtime::FrameInput> last_;
+    std::optional<Shown> shown_;
 };
 
 std::unique_ptr<PyRenderer> renderer_of(const std::shared_ptr<OpenedCase>& opened,
@@ -403,48 +423,79 @@ std::unique_ptr<PyRenderer> renderer_of(const std::shared_ptr<OpenedCase>& opene
         value_of(FrameRenderer::create(opened, request.exercise, options)), request);
 }
 
+// Width and height.
+std::pair<int, int> size_from(py::handle size) {
+    if (!py::isinstance<py::sequence>(size) || py::isinstance<py::str>(size) || py::len(size) != 2)
+        throw py::type_error("size: give (width, height), two whole numbers of pixels");
+    constexpr std::int64_t kMax = std::numeric_limits<int>::max();
+    const auto two = py::reinterpret_borrow<py::sequence>(size);
+    return {static_cast<int>(whole_within(py::object(two[0]), "size", -kMax, kMax)),
+            static_cast<int>(whole_within(py::object(two[1]), "size", -kMax, kMax))};
+}
+
+// 0: the model's own.
+int count_from(py::handle value, const char* name, runtime::Limits<int> limits) {
+    constexpr std::int64_t kMax = std::numeric_limits<std::int64_t>::max();
+    const std::int64_t count = whole_within(value, name, -kMax, kMax);
+    if (count != 0 && (count < limits.min || count > limits.max))
+        throw py::value_error(std::string(name) + ": " + std::to_string(count) +
+                              " is out of range: give " + std::to_string(limits.min) + " to " +
+                              std::to_string(limits.max) + ", or 0 for the model's own");
+    return static_cast<int>(count);
+}
+
+// None: nothing is put in place of `part`.
+template <class Part>
+void replace_part(const py::object& given, const char* expected, Part& part) {
+    if (given.is_none()) return;
+    if (!py::isinstance<Part>(given)) throw py::type_error(expected);
+    part = py::cast<Part>(given);
+}
+
 // What the arguments ask for.
 std::unique_ptr<PyRenderer> make_renderer(const std::shared_ptr<OpenedCase>& opened,
                                           const py::object& exercise,
-                                          const std::optional<Probe>& probe,
-                                          const std::optional<NeedleModel>& needle,
-                                          const std::string& model,
-                                          const std::string& machine,
+                                          const py::object& probe,
+                                          const py::object& needle,
+                                          py::handle model,
+                                          py::handle machine,
                                           const py::object& effects,
-                                          std::pair<int, int> size,
-                                          std::uint32_t seed,
-                                          const std::string& kind,
-                                          int scanlines,
-                                          int samples,
-                                          int looks) {
+                                          py::handle size,
+                                          py::handle seed,
+                                          py::handle kind,
+                                          py::handle scanlines,
+                                          py::handle samples,
+                                          py::handle looks) {
     check(usable(*opened));
     Request request;
     if (py::isinstance<CaseExercise>(exercise)) {
         request.exercise = py::cast<CaseExercise>(exercise);
+        check_of(request.exercise, *opened);
     } else if (exercise.is_none() || py::isinstance<py::str>(exercise)) {
-        const auto name = exercise.is_none() ? std::string() : py::cast<std::string>(exercise);
-        request.exercise = {value_of(exercise_named(*opened, name)), opened->path};
+        const auto name = exercise.is_none() ? std::string() : text_from(exercise, "exercise");
+        request.exercise = {value_of(exercise_named(*opened, name)), opened->absolute};
     } else {
         throw py::type_error("exercise: give a name or an Exercise");
     }
-    if (probe) request.exercise.probe = *probe;
-    if (needle) request.exercise.needle = *needle;
-    request.model = model;
-    request.machine = machine;
+    replace_part(probe, "probe: give a sonocase.Probe", request.exercise.probe);
+    replace_part(needle, "needle: give a sonocase.Needle", request.exercise.needle);
+    request.model = text_from(model, "model");
+    request.machine = path_from(machine, "machine");
+    if (request.machine.find('/') != std::string::npos || request.machine.ends_with(".toml"))
+        request.machine = absolute_path(request.machine);  // a file, as load_machine() sees it
     if (effects.is_none()) {
         request.effects = request.exercise.effects;
     } else if (py::isinstance<py::str>(effects)) {
-        request.effects = {py::cast<std::string>(effects)};
+        request.effects = {text_from(effects, "effects")};
     } else {
-        request.effects = py::cast<std::vector<std::string>>(effects);
+        request.effects = names_from(effects, "effects");
     }
-    request.width_px = size.first;
-    request.height_px = size.second;
-    request.seed = seed;
-    request.kind = kind;
-    request.scanlines = scanlines;
-    request.samples = samples;
-    request.looks = looks;
+    std::tie(request.width_px, request.height_px) = size_from(size);
+    request.seed = static_cast<std::uint32_t>(frame_from(seed, "seed"));
+    request.kind = text_from(kind, "renderer");
+    request.scanlines = count_from(scanlines, "scanlines", runtime::kScanlineLimits);
+    request.samples = count_from(samples, "samples", runtime::kSampleLimits);
+    request.looks = count_from(looks, "looks", runtime::kLookLimits);
     return renderer_of(opened, request);
 }
 
@@ -452,18 +503,17 @@ std::unique_ptr<PyRenderer> make_renderer(const std::shared_ptr<OpenedCase>& ope
 py::tuple renderer_state(const PyRenderer& renderer) {
     const Request& r = renderer.request();
     const OpenedCase& opened = renderer.inner().opened();
-    const bool is_file = py::cast<bool>(py::module_::import("os.path").attr("exists")(r.machine));
-    return py::make_tuple(absolute_path(opened.path), r.exercise, r.model,
-                          is_file ? absolute_path(r.machine) : r.machine, r.effects, r.width_px,
-                          r.height_px, r.seed, r.kind, r.scanlines, r.samples, r.looks);
+    return py::make_tuple(path_text(opened.absolute), r.exercise, r.model, path_text(r.machine),
+                          r.effects, r.width_px, r.height_px, r.seed, r.kind, r.scanlines,
+                          r.samples, r.looks);
 }
 
 std::unique_ptr<PyRenderer> renderer_of_state(const py::tuple& t) {
-    const auto opened = value_of(open_case(py::cast<std::string>(t[0])));
+    const auto opened = value_of(open_case(path_from(t[0], "path")));
     Request r;
     r.exercise = py::cast<CaseExercise>(t[1]);
     r.model = py::cast<std::string>(t[2]);
-    r.machine = py::cast<std::string>(t[3]);
+    r.machine = path_from(t[3], "machine");
     r.effects = py::cast<std::vector<std::string>>(t[4]);
     r.width_px = py::cast<int>(t[5]);
     r.height_px = py::cast<int>(t[6]);
@@ -478,19 +528,25 @@ std::unique_ptr<PyRenderer> renderer_of_state(const py::tuple& t) {
 }  // namespace
 
 void bind_renderer(py::module_& module) {
+    // A pointer to a member without arguments takes None for its object: lambdas take none.
     py::class_<PyRenderer>(module, "Renderer", "Renders frames of a case, as sonoplay does.")
         .def(
-            py::init(&make_renderer), "case"_a, "exercise"_a = py::none(), "probe"_a = py::none(),
-            "needle"_a = py::none(), py::kw_only(), "model"_a = "", "machine"_a = "",
-            "effects"_a = py::none(), "size"_a = std::pair<int, int>(512, 512), "seed"_a = 1u,
-            "renderer"_a = "fast", "scanlines"_a = 0, "samples"_a = 0, "looks"_a = 0,
+            py::init(&make_renderer), py::arg("case").none(false), "exercise"_a = py::none(),
+            "probe"_a = py::none(), "needle"_a = py::none(), py::kw_only(), "model"_a = "",
+            "machine"_a = "", "effects"_a = py::none(), "size"_a = py::make_tuple(512, 512),
+            "seed"_a = 1, "renderer"_a = "fast", "scanlines"_a = 0, "samples"_a = 0, "looks"_a = 0,
             "exercise: a name or an Exercise, the case's first by default; probe, needle: instead "
             "of the exercise's; model, machine, effects: as on sonoplay's command line, by default "
             "the exercise's; size: (width, height) in pixels; seed: of the noise; scanlines, "
-            "samples (of each), looks (speckle fields that are averaged): 0 for the model's own.")
-        .def("close", &PyRenderer::close,
-             "Frees its memory: it raises from then on. Its case stays open.")
-        .def_property_readonly("closed", &PyRenderer::closed)
+            "samples (of each), looks (speckle fields that are averaged): 0 for the model's own, "
+            "or as "
+            "on sonoplay's command line.")
+        .def(
+            "close", [](PyRenderer& r) { return r.close(); },
+            "Frees its memory: it raises from then on. Its case stays open.")
+        .def_property_readonly(
+            "closed", [](const PyRenderer& r) { return r.closed(); },
+            "Whether close() has been called.")
         .def("__enter__", [](const py::object& self) { return self; })
         .def("__exit__", [](PyRenderer& r, const py::args&) { r.close(); })
         .def(py::pickle(&renderer_state, &renderer_of_state))
@@ -511,13 +567,16 @@ void bind_renderer(py::module_& module) {
              "mode: b, or colour, power, pw (spectral), m (M-mode): then an array (rows, width, 3) "
              "of colours, with the strip of pw and m below the picture. doppler: settings of the "
              "console by name; where box or gate are not given, they lie on the widest vessel that "
-             "the plane cuts.")
+             "the plane cuts. A frame of mode b is of its arguments alone. Of pw and m the strip "
+             "goes on from the frames before, and of colour and power the probe's motion since "
+             "the last frame shows: a new Renderer has none before.")
         .def("aimed", &PyRenderer::aimed, "pose"_a,
              "Box, gate and angle cursor on the widest vessel that a plane cuts, as `doppler` of "
              "render() takes them: to keep them from frame to frame.")
-        .def_property_readonly("doppler", &PyRenderer::doppler,
-                               "Of the last frame's mode: a dict of what was measured in a "
-                               "spectrum and what was true there, or of a colour box's cells.")
+        .def_property_readonly(
+            "doppler", [](PyRenderer& r) { return r.doppler(); },
+            "Of the last frame's mode: a dict of what was measured in a "
+            "spectrum and what was true there, or of a colour box's cells.")
         .def("render_batch", &PyRenderer::render_batch, "poses"_a, "needles"_a = py::none(),
              "times_s"_a = py::none(), py::kw_only(), "first_frame"_a = 0, "gain_db"_a = 0.0,
              "dynamic_range_db"_a = 60.0, "press_mm"_a = 0.0, "dents"_a = py::none(),
@@ -528,25 +587,32 @@ void bind_renderer(py::module_& module) {
              "depend on `threads`. truth: names of planes; then (pictures, TruthPlanes, list of "
              "facts) is returned. Ctrl-C raises KeyboardInterrupt after the frames in hand.")
         .def("truth", &PyRenderer::truth,
-             "planes"_a = std::vector<std::string>{"labels", "needle", "shadowed", "skin_depth_mm",
-                                                   "lesions"},
+             "planes"_a =
+                 py::make_tuple("labels", "needle", "shadowed", "skin_depth_mm", "lesions"),
              "What the last frame shows: (TruthPlanes, facts). planes: those of TruthPlanes; "
              "rest_mm only where it is asked for. facts: a dict of `visible` organs and `lesions` "
              "with their areas, `targets` with their distances, the needle's `tip`, `contact`.")
-        .def_property_readonly("contact", &PyRenderer::contact,
-                               "Whether the probe of the last render() touched the skin.")
-        .def_property_readonly("press", &PyRenderer::press,
-                               "What the probe of the last frame did to the tissue: a dict of "
-                               "`pressed`, `force_n`, `pressure_kpa`, `deepest_mm`, `excess_mm` "
-                               "(by how much bone held it back) and `vein_open`.")
         .def_property_readonly(
-            "size", [](const PyRenderer& r) { return py::make_tuple(r.width(), r.height()); })
-        .def_property_readonly("exercise", [](const PyRenderer& r) { return r.request().exercise; })
-        .def_property_readonly("skipped_effects", &PyRenderer::skipped_effects,
-                               "Effects that the last frame did without: by name, why.")
+            "contact", [](const PyRenderer& r) { return r.contact(); },
+            "Whether the probe of the last frame touched the skin.")
+        .def_property_readonly(
+            "press", [](const PyRenderer& r) { return r.press(); },
+            "What the probe of the last frame did to the tissue: a dict of "
+            "`pressed`, `force_n`, `pressure_kpa`, `deepest_mm`, `excess_mm` "
+            "(by how much bone held it back) and `vein_open`.")
+        .def_property_readonly(
+            "size", [](const PyRenderer& r) { return py::make_tuple(r.width(), r.height()); },
+            "(width, height) of a picture, pixels.")
+        .def_property_readonly(
+            "exercise", [](const PyRenderer& r) { return r.request().exercise; },
+            "The Exercise that it shows, with the probe and the needle that it was given.")
+        .def_property_readonly(
+            "skipped_effects", [](PyRenderer& r) { return r.skipped_effects(); },
+            "Effects that the last frame did without: by name, why.")
         .def_property_readonly(
             "mm_per_px",
-            [](const PyRenderer& r) { return r.inner().engine().renderer().layout().mm_per_px; })
+            [](const PyRenderer& r) { return r.inner().engine().renderer().layout().mm_per_px; },
+            "Side of a pixel.")
         .def_property_readonly(
             "origin_px",
             [](const PyRenderer& r) {
@@ -555,6 +621,19 @@ void bind_renderer(py::module_& module) {
             },
             "Pixel (u, v) of the middle of the probe's face: x_mm = (u - u0) * mm_per_px, "
             "z_mm = (v - v0) * mm_per_px in the frame `probe`.");
+    py::dict limits = doppler_limits();
+    const auto add = [&](const char* name, auto of) {
+        limits[name] = py::make_tuple(of.min, of.max);
+    };
+    add("scanlines", runtime::kScanlineLimits);
+    add("samples", runtime::kSampleLimits);
+    add("looks", runtime::kLookLimits);
+    add("threads", runtime::kThreadLimits);
+    add("gain_db", runtime::kGainDbLimits);
+    add("dynamic_range_db", runtime::kDynamicRangeDbLimits);
+    add("press_mm", runtime::kPressMmLimits);
+    add("dent_mm", runtime::kDentMmLimits);
+    module.attr("_LIMITS") = limits;
     module.def("simd_targets", &runtime::simd_targets,
                "Names of the instruction sets of this machine and build, best first.");
 }

@@ -117,6 +117,7 @@ py::dict facts_of(const runtime::FrameTruth& truth,
         facts["tip"] =
             py::dict("probe_mm"_a = array_of(truth.tip_probe), "in_plane"_a = truth.tip_in_plane,
                      "visible"_a = truth.tip_visible, "label"_a = truth.tip_label,
+                     "name"_a = labels[truth.tip_label].name,
                      "shaft_in_image_mm"_a = truth.needle_in_image_mm,
                      "shaft_visible_mm"_a = truth.needle_visible_mm,
                      "dent_mm"_a = py::make_tuple(truth.needle.tent_mm, truth.needle.drag_mm));
@@ -148,7 +149,23 @@ void bind_truth(py::module_& module) {
             "rest_mm", [](const TruthArrays& t) { return t.rest_mm.object; },
             "float32 (height, width, 3): where the tissue that the pixel shows lies in the bundle, "
             "before contact, press, needle and breath moved it; NaN outside the scanned area and "
-            "where a beam is in air.");
+            "where a beam is in air.")
+        .def(py::pickle(
+            [](const TruthArrays& t) {
+                return py::make_tuple(t.labels.object, t.needle.object, t.shadowed.object,
+                                      t.skin_depth_mm.object, t.lesions.object,
+                                      t.rest_mm.object);
+            },
+            [](const py::tuple& t) {
+                TruthArrays arrays;
+                arrays.labels.object = t[0];
+                arrays.needle.object = t[1];
+                arrays.shadowed.object = t[2];
+                arrays.skin_depth_mm.object = t[3];
+                arrays.lesions.object = t[4];
+                arrays.rest_mm.object = t[5];
+                return arrays;
+            }));
 }
 
 }  // namespace sonocase::python

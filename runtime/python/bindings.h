@@ -13,4 +13,9 @@ void bind_pose(pybind11::module_& module);      // pose: a module of functions
 void bind_truth(pybind11::module_& module);     // Truth
 void bind_renderer(pybind11::module_& module);  // Renderer, simd_targets, effect_names
 
+struct CaseExercise;
+struct OpenedCase;
+// Raises ValueError where the exercise is another case's.
+void check_of(const CaseExercise& exercise, const OpenedCase& opened);
+
 }  // namespace sonocase::python

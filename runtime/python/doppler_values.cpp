@@ -2,7 +2,7 @@
 
 #include "doppler_values.h"
 
-#include <cmath>
+#include <cstdio>
 
 namespace sonocase::python {
 namespace {
@@ -13,34 +13,38 @@ using runtime::DopplerSettings;
 struct Number {
     const char* name;
     double DopplerSettings::*value;
+    runtime::Limits<double> limits;
 };
 constexpr Number kNumbers[] = {
-    {"box_left", &DopplerSettings::box_left},
-    {"box_right", &DopplerSettings::box_right},
-    {"box_top_mm", &DopplerSettings::box_top_mm},
-    {"box_bottom_mm", &DopplerSettings::box_bottom_mm},
-    {"gate_line", &DopplerSettings::gate_line},
-    {"gate_depth_mm", &DopplerSettings::gate_depth_mm},
-    {"gate_mm", &DopplerSettings::gate_mm},
-    {"angle_deg", &DopplerSettings::angle_deg},
-    {"steer_deg", &DopplerSettings::steer_deg},
-    {"scale_cm_s", &DopplerSettings::scale_cm_s},
-    {"spectral_scale_cm_s", &DopplerSettings::spectral_scale_cm_s},
-    {"baseline", &DopplerSettings::baseline},
-    {"wall_filter", &DopplerSettings::wall_filter},
-    {"doppler_gain_db", &DopplerSettings::gain_db},
-    {"priority", &DopplerSettings::priority},
-    {"diameter_mm", &DopplerSettings::diameter_mm},
+    {"box_left", &DopplerSettings::box_left, runtime::kFacePartLimits},
+    {"box_right", &DopplerSettings::box_right, runtime::kFacePartLimits},
+    {"box_top_mm", &DopplerSettings::box_top_mm, runtime::kDepthMmLimits},
+    {"box_bottom_mm", &DopplerSettings::box_bottom_mm, runtime::kDepthMmLimits},
+    {"gate_line", &DopplerSettings::gate_line, runtime::kFacePartLimits},
+    {"gate_depth_mm", &DopplerSettings::gate_depth_mm, runtime::kDepthMmLimits},
+    {"gate_mm", &DopplerSettings::gate_mm, runtime::kGateMmLimits},
+    {"angle_deg", &DopplerSettings::angle_deg, runtime::kAngleDegLimits},
+    {"steer_deg", &DopplerSettings::steer_deg, runtime::kSteerDegLimits},
+    {"scale_cm_s", &DopplerSettings::scale_cm_s, runtime::kScaleCmSLimits},
+    {"spectral_scale_cm_s", &DopplerSettings::spectral_scale_cm_s,
+     runtime::kSpectralScaleCmSLimits},
+    {"baseline", &DopplerSettings::baseline, runtime::kBaselineLimits},
+    {"wall_filter", &DopplerSettings::wall_filter, runtime::kWallFilterLimits},
+    {"doppler_gain_db", &DopplerSettings::gain_db, runtime::kDopplerGainDbLimits},
+    {"priority", &DopplerSettings::priority, runtime::kPriorityLimits},
+    {"diameter_mm", &DopplerSettings::diameter_mm, runtime::kDiameterMmLimits},
 };
 constexpr std::size_t kBoxNumbers = 4, kGateNumbers = 7, kAimNumbers = 9;  // the first of the table
 
 struct Count {
     const char* name;
     int DopplerSettings::*value;
+    runtime::Limits<int> limits;
 };
-constexpr Count kCounts[] = {{"ensemble", &DopplerSettings::ensemble},
-                             {"persistence", &DopplerSettings::persistence},
-                             {"gate_points", &DopplerSettings::gate_points}};
+constexpr Count kCounts[] = {
+    {"ensemble", &DopplerSettings::ensemble, runtime::kEnsembleLimits},
+    {"persistence", &DopplerSettings::persistence, runtime::kPersistenceLimits},
+    {"gate_points", &DopplerSettings::gate_points, runtime::kGatePointLimits}};
 
 bool gives(const py::dict& given, std::size_t first, std::size_t end) {
     for (std::size_t i = first; i < end; ++i)
@@ -49,21 +53,30 @@ bool gives(const py::dict& given, std::size_t first, std::size_t end) {
 }
 
 bool set_one(const std::string& name, py::handle value, DopplerSettings& settings) {
+    const std::string place = "doppler: " + name;
     for (const Number& number : kNumbers) {
         if (name != number.name) continue;
-        const auto read = py::cast<double>(value);
-        if (!std::isfinite(read)) throw py::value_error("doppler: " + name + " is not finite");
-        settings.*number.value = read;
+        settings.*number.value = number_within(value, place, number.limits);
         return true;
     }
     for (const Count& count : kCounts) {
         if (name != count.name) continue;
-        settings.*count.value = py::cast<int>(value);
+        settings.*count.value =
+            static_cast<int>(whole_within(value, place, count.limits.min, count.limits.max));
         return true;
     }
     if (name != "invert") return false;
-    settings.invert = py::cast<bool>(value);
+    settings.invert = number_from(value, place) != 0;
     return true;
+}
+
+// "doppler: box_left 0.8 is not below box_right 0.75; give both".
+void refuse_reversed(const Number& low, const Number& high, const DopplerSettings& settings) {
+    if (settings.*low.value < settings.*high.value) return;
+    char text[128];
+    std::snprintf(text, sizeof text, "doppler: %s %.6g is not below %s %.6g; give both", low.name,
+                  settings.*low.value, high.name, settings.*high.value);
+    throw py::value_error(text);
 }
 
 std::string label_of(const std::vector<Label>& labels, int label) {
@@ -84,19 +97,34 @@ DopplerMode doppler_mode(const std::string& name) {
 
 void apply_doppler(const py::dict& given, DopplerSettings& settings) {
     for (const auto& [key, value] : given) {
-        const auto name = py::cast<std::string>(key);
+        const std::string name = text_from(key, "doppler");
         if (!set_one(name, value, settings))
             throw py::value_error("doppler: no setting " + name +
                                   "; docs/python.md lists those that there are");
     }
+    refuse_reversed(kNumbers[0], kNumbers[1], settings);
+    refuse_reversed(kNumbers[2], kNumbers[3], settings);
 }
 
-bool gives_box(const py::dict& given) {
-    return gives(given, 0, kBoxNumbers);
+void take_aim(const py::dict& given, const DopplerSettings& aim, DopplerSettings& settings) {
+    const auto take = [&](std::size_t first, std::size_t end) {
+        if (gives(given, first, end)) return;
+        for (std::size_t i = first; i < end; ++i)
+            settings.*kNumbers[i].value = aim.*kNumbers[i].value;
+    };
+    take(0, kBoxNumbers);
+    if (!gives(given, kBoxNumbers, kGateNumbers)) {
+        take(kBoxNumbers, kGateNumbers);
+        take(kGateNumbers, kGateNumbers + 1);  // the cursor lies along the gate's vessel
+    }
+    take(kAimNumbers - 1, kAimNumbers);
 }
 
-bool gives_gate(const py::dict& given) {
-    return gives(given, kBoxNumbers, kGateNumbers);
+py::dict doppler_limits() {
+    py::dict limits;
+    for (const Number& n : kNumbers) limits[n.name] = py::make_tuple(n.limits.min, n.limits.max);
+    for (const Count& n : kCounts) limits[n.name] = py::make_tuple(n.limits.min, n.limits.max);
+    return limits;
 }
 
 py::dict aim_of(const DopplerSettings& settings) {

@@ -14,12 +14,15 @@ namespace sonocase::python {
 runtime::DopplerMode doppler_mode(const std::string& name);
 
 // Settings by the names of recordings (docs/format.md, part 7): box_left, scale_cm_s, gate_mm, ...
-// Those that the dict lacks keep their values. Raises ValueError for unknown names and values that
-// are not finite.
+// Those that the dict lacks keep their values. Raises ValueError for unknown names, for values out
+// of their limits (runtime/imaging/core/control_limits.h) and for a box without an area.
 void apply_doppler(const py::dict& given, runtime::DopplerSettings& settings);
-// True where the dict places the box, or the gate.
-bool gives_box(const py::dict& given);
-bool gives_gate(const py::dict& given);
+// Takes box, gate and steering of `aim` where the dict does not place them.
+void take_aim(const py::dict& given,
+              const runtime::DopplerSettings& aim,
+              runtime::DopplerSettings& settings);
+// By name: (min, max).
+py::dict doppler_limits();
 
 // Box, gate, cursor and steering of these settings.
 py::dict aim_of(const runtime::DopplerSettings& settings);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <filesystem>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -11,10 +12,17 @@
 
 namespace sonocase::python {
 
+std::string absolute_path(const std::string& path) {
+    std::error_code failed;
+    const std::filesystem::path absolute = std::filesystem::absolute(path, failed);
+    return failed ? path : absolute.string();
+}
+
 Result<std::shared_ptr<OpenedCase>> open_case(const std::string& path) {
     SONOCASE_TRY(StreamedBundle bundle, open_bundle(path));
     auto opened = std::make_shared<OpenedCase>();
     opened->path = path;
+    opened->absolute = absolute_path(path);
     opened->bundle = std::move(bundle);
     for (const EmbeddedExercise& embedded : opened->bundle->exercises) {
         Result<Exercise> exercise = parse_exercise(embedded.toml, path + ":" + embedded.name);
@@ -50,6 +58,13 @@ Result<Exercise> exercise_named(const OpenedCase& opened, const std::string& nam
     }
     return Error{"no exercise named " + name, opened.path,
                  names.empty() ? "this bundle holds none" : "this bundle holds: " + names};
+}
+
+bool is_of(const CaseExercise& exercise, const OpenedCase& opened) {
+    if (exercise.case_path == opened.absolute) return true;
+    std::error_code failed;  // a file that has gone: nobody knows
+    const bool same = std::filesystem::equivalent(exercise.case_path, opened.absolute, failed);
+    return same || failed;
 }
 
 Result<std::unique_ptr<FrameRenderer>> FrameRenderer::create(
@@ -116,6 +131,7 @@ void FrameRenderer::render_with(Worker& worker, FrameTask& task) {
 }
 
 void FrameRenderer::render(FrameTask& task) {
+    last_worker_ = 0;
     render_with(*workers_.front(), task);
 }
 
@@ -148,6 +164,7 @@ Result<bool> FrameRenderer::render_all(std::span<FrameTask> tasks,
             const std::size_t n = stop ? tasks.size() : next++;
             if (n >= tasks.size()) return;
             render_with(*workers_[part], tasks[n]);
+            if (n + 1 == tasks.size()) last_worker_ = part;
         }
     };
     std::vector<std::thread> helpers;

@@ -24,7 +24,8 @@ namespace sonocase::python {
 // Stays in place and is shared by its renderers, so that closing it frees nothing that a frame on
 // another thread still reads.
 struct OpenedCase {
-    std::string path;
+    std::string path;      // as given
+    std::string absolute;  // as pickles hold it, for a process that stands elsewhere
     StreamedBundle bundle;
     std::vector<Exercise> exercises;    // those that could be read
     std::vector<std::string> warnings;  // whole sentences, about those that could not
@@ -33,8 +34,11 @@ struct OpenedCase {
 
 // An exercise and the bundle that holds it: probe and needle may have changed since, nothing else.
 struct CaseExercise : Exercise {
-    std::string case_path;
+    std::string case_path;  // absolute
 };
+
+// From the folder in which the process stands now.
+std::string absolute_path(const std::string& path);
 
 // Errors: a file that cannot be read or is not a bundle.
 Result<std::shared_ptr<OpenedCase>> open_case(const std::string& path);
@@ -44,6 +48,9 @@ Status usable(const OpenedCase& opened);
 
 // The exercise of that name; "" means the first, and where the bundle holds none, a free scan.
 Result<Exercise> exercise_named(const OpenedCase& opened, const std::string& name);
+
+// False where it is known to be another case's: of another file than this one.
+bool is_of(const CaseExercise& exercise, const OpenedCase& opened);
 
 // How far the skin is looked for, and over which ball its normal is averaged, unless said.
 constexpr double kSkinReachMm = 60, kSkinRadiusMm = 12;
@@ -96,6 +103,8 @@ class FrameRenderer {
     const Exercise& exercise() const { return exercise_; }
     const runtime::RenderOptions& options() const { return options_; }
     const runtime::ScanEngine& engine() const { return workers_.front()->engine; }
+    // That rendered the last frame, or the last one of a batch.
+    const runtime::ScanEngine& last_engine() const { return workers_[last_worker_]->engine; }
 
   private:
     FrameRenderer(std::shared_ptr<OpenedCase> opened,
@@ -116,7 +125,8 @@ class FrameRenderer {
     std::shared_ptr<OpenedCase> opened_;
     Exercise exercise_;
     runtime::RenderOptions options_;
-    std::vector<std::unique_ptr<Worker>> workers_;   // at least one
+    std::vector<std::unique_ptr<Worker>> workers_;  // at least one
+    std::size_t last_worker_ = 0;
     std::unique_ptr<runtime::DopplerView> doppler_;  // of the first; null until asked for
 };
 

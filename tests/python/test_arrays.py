@@ -235,6 +235,11 @@ def test_an_array_of_ours_is_seen_in_place_by_every_protocol():
 def test_arrays_that_cannot_be_are_refused():
     with pytest.raises(ValueError, match="no dtype complex64"):
         sonocase.Array((2,), "complex64")
+    for shape in ("ab", 5, (1.5,), ("a",), None):
+        with pytest.raises(TypeError, match="shape: .*give a tuple of whole numbers"):
+            sonocase.Array(shape)
+    with pytest.raises(TypeError, match="dtype: give its name"):
+        sonocase.Array((2,), np.float32)
     with pytest.raises(ValueError, match="from 0 on"):
         sonocase.Array((2, -1))
     with pytest.raises(MemoryError):

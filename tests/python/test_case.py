@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a case says about itself, and the scores of a session on it."""
 
+import copy
 import json
 import os
 import pathlib
+import pickle
 import subprocess
 
 import numpy as np
@@ -71,6 +73,92 @@ def test_a_session_is_read_and_scored(case, small):
     assert score["targets"][0]["name"] == "vessel"
     with pytest.raises(sonocase.Error, match="no such file"):
         sonocase.score(case, "/nowhere/session.igs.mha")
+
+
+@pytest.mark.parametrize("name", [b"caf\xe9", "café".encode(), b"\xff\xfe  "])
+def test_files_of_any_name_are_read(small, tmp_path, pose, name):
+    """Names of files are bytes: os.fsencode and os.fsdecode say them as text, both ways."""
+    folder = os.fsencode(tmp_path)
+    case_path, session = os.path.join(folder, name + b".sonocase"), os.path.join(folder, name + b".igs.mha")
+    for copied, path in zip(small, (case_path, session)):
+        os.symlink(copied, path)
+    text = os.fsdecode(case_path)
+    for given in (case_path, text, pathlib.Path(text)):
+        case = sonocase.Case.open(given)
+        assert case.path == text and text in repr(case)
+        renderer = sonocase.Renderer(case, size=(16, 16))
+        again = pickle.loads(pickle.dumps((case, case.exercise(), renderer)))
+        assert again[0].path == text and again[1].name == case.exercise().name
+        np.testing.assert_array_equal(again[2].render(pose), renderer.render(pose))
+    machine = os.path.join(folder, name + b".toml")
+    with open(machine, "w") as file:
+        file.write('[machine]\nbase = "modern"\n')
+    for given in (machine, os.fsdecode(machine)):
+        pickle.loads(pickle.dumps(sonocase.Renderer(case, machine=given, size=(16, 16))))
+    for given in (session, os.fsdecode(session), pathlib.Path(os.fsdecode(session))):
+        assert len(sonocase.read_session(given)["time_s"]) == 60
+        assert sonocase.score(case, given)["targets"][0]["name"] == "vessel"
+    missing = os.path.join(folder, name + b".none")
+    for use in (sonocase.Case.open, sonocase.read_session, lambda path: sonocase.score(case, path)):
+        with pytest.raises(sonocase.Error) as raised:
+            use(missing)
+        assert os.fsdecode(missing) in str(raised.value) and "no such file" in str(raised.value)
+    case.close()
+    with pytest.raises(sonocase.Error, match="the case is closed"):
+        case.labels
+
+
+def test_what_is_no_path_is_refused(case):
+    for use in (sonocase.Case.open, sonocase.read_session, lambda path: sonocase.score(case, path),
+                lambda path: sonocase.Renderer(case, machine=path)):
+        for bad in ("a\0b", b"a\0b"):
+            with pytest.raises(ValueError, match="no file's name has, as NUL"):
+                use(bad)
+        for bad in (None, 3, ["a"]):
+            with pytest.raises(TypeError, match="give a path"):
+                use(bad)
+
+
+def test_pickles_know_the_folder_in_which_a_case_was_opened(small, tmp_path, monkeypatch, pose):
+    monkeypatch.chdir(small[0].parent)
+    case = sonocase.Case.open(small[0].name)
+    (tmp_path / "mine.toml").write_text('[machine]\nbase = "modern"\n')
+    machine = os.path.relpath(tmp_path / "mine.toml")
+    ours = case, case.exercise(), sonocase.Renderer(case, machine=machine, size=(16, 16))
+    monkeypatch.chdir(tmp_path)
+    again = pickle.loads(pickle.dumps(ours))
+    assert again[0].name == case.name
+    np.testing.assert_array_equal(again[2].render(pose), ours[2].render(pose))
+
+
+def test_everything_public_goes_through_a_pickle(case, pose):
+    exercise = case.exercise("scan")
+    renderer = sonocase.Renderer(case, size=(16, 16))
+    renderer.render(pose, sonocase.Pose.looking((20, 0, 43), (-8, 0, -9)))
+    planes, facts = renderer.truth()
+    array = sonocase.Array((2, 3), "float32")
+    np.asarray(array)[:] = [[1, 2, 3], [4, 5, float("inf")]]
+    values = {"Array": array, "Case": case, "Error": sonocase.Error("a line"), "Exercise": exercise, "Label": case.labels[2],
+              "Needle": sonocase.Needle(gauge=20), "Probe": sonocase.Probe(depth_mm=60), "Renderer": renderer,
+              "Target": exercise.targets[0], "TruthPlanes": planes}
+    assert set(values) == {name for name in sonocase.__all__ if isinstance(getattr(sonocase, name), type)}
+
+    def seen(value):
+        if isinstance(value, np.ndarray):
+            return value.tolist()
+        if type(value).__module__ != "sonocase._core":
+            return value
+        return {n: seen(getattr(value, n)) for n in dir(value)
+                if isinstance(getattr(type(value), n, None), property) and n not in ("__array_interface__", "doppler", "skipped_effects")}
+    for name, value in values.items():
+        for again in (pickle.loads(pickle.dumps(value)), copy.deepcopy(value)):
+            assert type(again) is type(value)
+            if name == "Renderer":  # it goes without its frames
+                again.render(pose, sonocase.Pose.looking((20, 0, 43), (-8, 0, -9)))
+            np.testing.assert_equal(str(seen(again)), str(seen(value)))
+    assert pickle.loads(pickle.dumps(array)).tolist() == array.tolist()
+    assert pickle.loads(pickle.dumps(values["Error"])).args == ("a line",)
+    np.testing.assert_equal(pickle.loads(pickle.dumps(facts)), facts)
 
 
 def test_the_list_of_a_procedure_is_the_players(tmp_path, sonoplay):

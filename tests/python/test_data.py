@@ -3,6 +3,7 @@
 
 import io
 import json
+import os
 import pickle
 import subprocess
 import sys
@@ -57,19 +58,112 @@ def test_both_formats_give_the_same_frames(made):
         assert a.keys() == b.keys() == {"image", *planes}
         for plane in ("image", "labels", "needle", "shadowed"):
             np.testing.assert_array_equal(a[plane], b[plane])
-        # In the picture to 1/100 mm, and 0 stands for nothing and for what lies before the skin.
-        np.testing.assert_allclose(np.nan_to_num(a["skin_depth_mm"]), np.nan_to_num(b["skin_depth_mm"]).clip(0),
-                                   rtol=0, atol=0.0051)
+        # In the picture to 1/100 mm, and what lies before the skin at 0.01 mm: 0 stands for nothing.
+        np.testing.assert_allclose(a["skin_depth_mm"], b["skin_depth_mm"].clip(0.01), rtol=0, atol=0.0051)
+    assert any((frame["skin_depth_mm"] <= 0).any() for frame in arrays)
+
+
+def test_what_a_frame_holds_is_the_callers_own(made):
+    for form in ("png", "npy"):
+        data = DataSet(made / form, planes=("labels", "needle", "shadowed", "skin_depth_mm"))
+        frame = data[0]
+        for plane in data.planes:
+            frame[plane] += 1
+        assert all((data[0][plane] != frame[plane]).any() for plane in data.planes)
 
 
 def test_splits_classes_and_facts(made):
     whole, test = DataSet(made / "png"), DataSet(made / "png", "test", facts=True)
-    assert 0 < len(test) < len(whole) and len(DataSet(made / "png", "validate")) == 0
+    assert 0 < len(test) < len(whole)
     assert {frame["facts"]["split"] for frame in test} == {"test"}
-    one = DataSet(made / "png", classes=["rest", "vessel"])
+    one = DataSet(made / "png", classes=["vessel"])
+    assert one.classes == DataSet(made / "png", classes=("outside", "vessel")).classes == ["outside", "vessel"]
     for frame, all_classes in zip(one, whole):
         np.testing.assert_array_equal(frame["labels"], all_classes["labels"] == 2)
     assert pickle.loads(pickle.dumps(one)).classes == one.classes  # as a loader's workers get it
+
+
+def test_a_split_without_frames_is_said(made):
+    for split in ("val", "Train", "", 3):
+        with pytest.raises(ValueError, match="split: no split .*: give one of train, validate, test"):
+            DataSet(made / "png", split)
+    with pytest.raises(sonocase.Error, match="no frames of the split validate: there are train, test"):
+        DataSet(made / "png", "validate")
+
+
+@pytest.mark.parametrize("classes, words", [
+    ("vessel", "'vessel' is no list"), (["vessl"], "no case has a label vessl: did you mean vessel"), (["vessel", "vessel"], "vessel is there twice"),
+    (["zzz"], "no case has a label zzz: expected some of muscle, vessel"), (["vessel", "outside"], "outside is not the first"), ([3], "no case has a label 3"),
+    (3, "3 is no list")])
+def test_classes_that_no_case_has_are_refused(made, small, classes, words):
+    for make in (lambda: DataSet(made / "png", classes=classes), lambda: DrawnFrames(small[0], {}, classes=classes)):
+        with pytest.raises(ValueError, match=f"classes: .*{words}"):
+            make()
+
+
+@pytest.mark.parametrize("planes, words", [("labels", "'labels' is no list"), (None, "None is no list"), (["label"], "unknown plane 'label'")])
+def test_planes_are_a_list_of_names(made, small, planes, words):
+    for make in (lambda: DataSet(made / "png", planes=planes), lambda: DrawnFrames(small[0], {}, planes=planes)):
+        with pytest.raises(ValueError, match=words):
+            make()
+
+
+def in_classes_or_outside(facts, classes):
+    """The numbers of what a frame shows and of what the tip is in, beside the names; how many were seen."""
+    truth = facts["truth"]
+    numbers = [(v["index"], v["name"]) for v in truth["visible"]]
+    if truth.get("tip"):
+        numbers.append((truth["tip"]["label"], truth["tip"]["name"]))
+    for number, name in numbers:
+        assert classes[number] == name if name in classes else number == 0
+    return len(numbers)
+
+
+@pytest.mark.parametrize("classes", [None, ["vessel"], ["vessel", "muscle"]])
+def test_the_numbers_of_facts_are_those_of_the_classes(made, small, tmp_path, classes):
+    """The palette is outside, muscle, vessel: of the classes given, none has that order."""
+    lines = (made / "png" / "manifest.jsonl").read_text()
+    data = DataSet(made / "png", facts=True, classes=classes)
+    drawn = DrawnFrames(small[0], DOMAIN, seed=7, count=4, size=(64, 48), facts=True, classes=classes)
+    for n, frames in enumerate((data, drawn)):
+        numbers = sum(in_classes_or_outside(frame["facts"], frames.classes) for frame in frames)
+        assert numbers > 2 * len(frames)
+        for frame in frames:  # and what is visible is in the plane of labels
+            seen = {v["index"] for v in frame["facts"]["truth"]["visible"]}
+            assert set(np.unique(frame["labels"])) - {0} == seen - {0}
+        write_zarr(frames, tmp_path / f"{n}.zarr")
+        write_webdataset(frames, tmp_path / f"{n}-%d.tar")
+        exported = list(map(json.loads, (tmp_path / f"{n}.zarr" / "manifest.jsonl").read_text().splitlines()))
+        with tarfile.open(tmp_path / f"{n}-0.tar") as tar:
+            exported += [json.load(tar.extractfile(m)) for m in tar if m.name.endswith(".json")]
+        assert sum(in_classes_or_outside(record, frames.classes) for record in exported) == 2 * numbers
+    assert (made / "png" / "manifest.jsonl").read_text() == lines
+
+
+def test_a_slice_is_a_list_of_frames(made, small):
+    drawn = DrawnFrames(small[0], DOMAIN, seed=7, count=5, size=(16, 16))
+    for frames in (DataSet(made / "png"), drawn):
+        for part in (slice(1, 3), slice(None, None, 2), slice(-2, None), slice(4, 1), slice(3, 100)):
+            wanted = list(range(len(frames)))[part]
+            assert [f["image"].tobytes() for f in frames[part]] == [frames[n]["image"].tobytes() for n in wanted]
+            assert [r["index"] for r in frames.records[part]] == [frames.records[n]["index"] for n in wanted]
+        assert frames[np.int64(1)]["image"].tobytes() == frames[1]["image"].tobytes()
+        for bad, kind in (("a", TypeError), (1.5, TypeError), (100, IndexError)):
+            with pytest.raises(kind):
+                frames[bad]
+
+
+def test_frames_are_found_from_any_folder(made, small, tmp_path, monkeypatch):
+    monkeypatch.chdir(made)
+    (tmp_path / "mine.toml").write_text('[machine]\nbase = "modern"\n')
+    description = {"model": "physical", "machine": os.path.relpath(tmp_path / "mine.toml", made)}
+    frames = [DataSet("png"), DrawnFrames("small.sonocase", description, seed=7, count=3, size=(16, 16), facts=True)]
+    expected = [f[2]["image"].tobytes() for f in frames]
+    record = json.loads(json.dumps(frames[1].records[2]))
+    sent = pickle.dumps(frames)
+    monkeypatch.chdir(tmp_path)
+    assert [f[2]["image"].tobytes() for f in frames] == [f[2]["image"].tobytes() for f in pickle.loads(sent)] == expected
+    assert os.path.isabs(record["case"]) and picture(record).tobytes() == expected[1]
 
 
 def test_the_record_says_how_large_a_pixel_is(made, case):
@@ -127,6 +221,33 @@ def test_webdataset_holds_the_frames_and_is_the_same_bytes(made, tmp_path):
                 np.testing.assert_array_equal(np.load(io.BytesIO(content[f"{key}.{plane}.npy"])), frame[plane])
             seen += 1
     assert seen == 12
+
+
+def test_shards_of_another_run_are_not_mixed_with_new_ones(made, tmp_path):
+    data = DataSet(made / "npy")
+    for pattern in (tmp_path / "x-%03d.tar", tmp_path / "100%" / "x-%06d.tar", tmp_path / "n%d" / "x.tar", tmp_path / "%%-%4d.tar"):
+        write_webdataset(data, pattern, 5)
+        written = sorted(str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*.tar"))
+        assert len(written) == 3 and not list(tmp_path.rglob("*.part"))
+        for frames in (3, 5, 100):
+            with pytest.raises(sonocase.Error, match="is there already: remove the shards"):
+                write_webdataset(data, pattern, frames)
+        assert written == sorted(str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*.tar"))
+        for path in tmp_path.rglob("*.tar"):
+            path.unlink()
+    assert (tmp_path / "100%").is_dir() and (tmp_path / "n2").is_dir()
+    (tmp_path / "x-000.tar.part").touch()  # of a run that was stopped, and of another pattern
+    (tmp_path / "x-y.tar").touch()
+    write_webdataset(data, tmp_path / "x-%03d.tar")
+    assert {p.name for p in tmp_path.iterdir() if p.is_file()} == {"x-000.tar", "x-y.tar"}
+
+
+def test_a_run_that_fails_leaves_no_shards(made, tmp_path):
+    data = DataSet(made / "npy")
+    data.records[-1] = {**data.records[-1], "chunk": 99}
+    with pytest.raises(sonocase.Error, match="no such file"):
+        write_webdataset(data, tmp_path / "x-%d.tar", 2)
+    assert not list(tmp_path.iterdir())
 
 
 def read_zarr(folder, name):
@@ -287,9 +408,27 @@ def test_a_bad_range_is_one_sentence_that_names_its_key(small, change, words):
     assert "\n" not in str(raised.value)
 
 
+def test_numbers_of_numpy_are_numbers(small):
+    own = {"gain_db": [-6, 6], "pose": {"press_mm": 3.0}, "needle": {"share": {"one_of": [0.0, 1.0]}}, "chunk": 2}
+    numpys = {"gain_db": np.array([-6, 6]), "pose": {"press_mm": np.float64(3)},
+              "needle": {"share": {"one_of": np.array([0.0, 1.0])}}, "chunk": np.int64(2)}
+    a, b = (DrawnFrames(small[0], d, seed=np.int64(7), count=np.int32(4), size=np.array([16, 16])) for d in (own, numpys))
+    assert json.dumps(list(a.records)) == json.dumps(list(b.records))
+    for bad, words in (({"seed": 1.9}, "seed: 1.9 is no whole"), ({"count": "3"}, "count: '3'"), ({"size": 64}, "size: 64 is no size")):
+        with pytest.raises(ValueError, match=words):
+            DrawnFrames(small[0], {}, **bad)
+    with pytest.raises(ValueError, match="pose.press_mm: of type object"):
+        DrawnFrames(small[0], {"pose": {"press_mm": object()}})
+
+
 @pytest.mark.parametrize("arguments, words", [
     (["coco", "none", "-o", "x.json"], "dataset.json"), (["coco", "npy", "-o", "x.json"], "png"),
-    (["webdataset", "npy", "-o", "x.tar"], "number"), (["zarr", "npy", "-o", "npy"], "there already"),
+    (["webdataset", "npy", "-o", "x.tar"], "number"), (["webdataset", "npy", "-o", "x-%d-%d.tar"], "one number"),
+    (["webdataset", "npy", "-o", "x-%%06d.tar"], "one number"), (["webdataset", "npy", "-o", "."], "one number"),
+    (["webdataset", "npy", "-o", "x-%d.tar", "--frames-per-shard", "0"], "frames_per_shard: 0"),
+    (["webdataset", "npy", "-o", "x-%d.tar", "--split", "validate"], "no frames"),
+    (["coco", "png", "-o", "."], "is a folder"), (["zarr", "png", "-o", "."], "there already"),
+    (["zarr", "npy", "-o", "npy"], "there already"),
     (["zarr", "npy", "-o", "x.zarr", "--split", "validate"], "no frames"),
     (["zarr", "npy", "-o", "x.zarr", "--frames-per-chunk", "0"], "frames_per_chunk")])
 def test_what_cannot_be_done_is_one_line(made, tmp_path, capsys, monkeypatch, arguments, words):
@@ -302,6 +441,6 @@ def test_what_cannot_be_done_is_one_line(made, tmp_path, capsys, monkeypatch, ar
 
 def test_a_class_list_is_kept_by_both_writers(made, tmp_path, monkeypatch):
     monkeypatch.chdir(made)
-    assert main(["coco", "png", "-o", str(tmp_path / "c.json"), "--split", "test"]) == 0
-    assert {i["id"] for i in json.loads((tmp_path / "c.json").read_text())["images"]} == \
+    assert main(["coco", "png", "-o", str(tmp_path / "new" / "c.json"), "--split", "test"]) == 0
+    assert {i["id"] for i in json.loads((tmp_path / "new" / "c.json").read_text())["images"]} == \
         {r["index"] for r in DataSet("png", "test").records}

@@ -50,7 +50,7 @@ def unknown(facts):
 @pytest.mark.parametrize("task", TASKS)
 def test_what_is_not_known_is_left_out_of_the_facts(case, task):
     _, info = VectorEnvironment(case, task, 2, size=(32, 32)).reset()
-    assert set(unknown(info["facts"])) <= {"tip"}  # of a task without a needle in all its environments
+    assert set(unknown(list(info["facts"]))) <= {"tip"}  # of a task without a needle in all its environments
 
 
 STAND_IN = {
@@ -147,7 +147,7 @@ def test_its_own_checks_pass(case, small):
     gymnasium = pytest.importorskip("gymnasium")
     from gymnasium.utils.env_checker import check_env
     for task in TASKS:
-        check_env(Environment(case, task, size=(48, 40)), skip_render_check=True)
+        check_env(Environment(case, task, size=(48, 40), render_mode="rgb_array"), skip_render_check=True)
     env = gymnasium.make("sonocase/find-view-v0", case=str(small[0]), size=(32, 32), max_episode_steps=3)
     env = gymnasium.wrappers.RecordEpisodeStatistics(env)
     env.reset(seed=1)

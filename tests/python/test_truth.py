@@ -126,10 +126,16 @@ def test_the_player_writes_the_same(small, sonoplay, tmp_path):
         np.testing.assert_array_equal(read("labels"), planes.labels)
         np.testing.assert_array_equal(read("needle"), planes.needle)
         np.testing.assert_array_equal(read("shadow"), planes.shadowed)
-        depth = np.nan_to_num(planes.skin_depth_mm)
-        np.testing.assert_allclose(read("depth") / 100, np.maximum(depth, 0), atol=0.0051)
+        # 0 stands for no depth alone: what lies before the skin is written as 0.01 mm.
+        measured = ~np.isnan(planes.skin_depth_mm)
+        np.testing.assert_array_equal(read("depth") > 0, measured)
+        np.testing.assert_allclose(read("depth")[measured] / 100, np.maximum(planes.skin_depth_mm[measured], 0.01),
+                                   atol=0.0051)
         assert [o["name"] for o in line["visible"]] == [o["name"] for o in facts["visible"]]
-        assert line["tip"]["in_plane"] == facts["tip"]["in_plane"]
+        assert line["tip"].keys() == facts["tip"].keys()
+        for name in ("in_plane", "label", "name", "visible"):
+            assert line["tip"][name] == facts["tip"][name]
+        assert case.labels[facts["tip"]["label"]].name == facts["tip"]["name"]
         assert line["targets"][0]["tip_mm"] == pytest.approx(facts["targets"][0]["tip_mm"])
 
 

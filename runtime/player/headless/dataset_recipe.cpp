@@ -4,6 +4,7 @@
 
 #include "formats/exercise/exercise.h"
 #include "formats/text/toml_reader.h"
+#include "runtime/imaging/core/control_limits.h"
 
 namespace sonocase::runtime::inline player_headless {
 namespace {
@@ -42,7 +43,7 @@ void read_machine(const TomlTable& table, DatasetRecipe& r) {
     table.text("model", r.model, {"physical", "paper"});
     table.texts("names", r.machines, true);
     table.numbers("depth_mm", r.depths_mm, 5, 500, 1, 64);
-    read_range(table, "gain_db", r.gain_db, -60, 60);
+    read_range(table, "gain_db", r.gain_db, kGainDbLimits.min, kGainDbLimits.max);
     table.finish();
 }
 

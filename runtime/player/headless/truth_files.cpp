@@ -70,11 +70,13 @@ Json lesions_json(const FrameTruth& truth, const Exercise& exercise) {
     return lesions;
 }
 
+// 0 is kept for what has no depth.
 std::vector<std::uint16_t> hundredths(const std::vector<float>& depth_mm) {
     std::vector<std::uint16_t> out;
     out.reserve(depth_mm.size());
     for (const float depth : depth_mm) {
-        const float value = depth > 0 ? std::min(depth * 100 + 0.5f, 65535.0f) : 0.0f;
+        const float value =
+            std::isnan(depth) ? 0.0f : std::clamp(depth * 100 + 0.5f, 1.0f, 65535.0f);
         out.push_back(static_cast<std::uint16_t>(value));
     }
     return out;

@@ -25,21 +25,23 @@ from ._core import (
     Probe,
     Renderer,
     Target,
+    TruthPlanes,
     __version__,
+    read_session,
     simd_targets,
 )
 
 __all__ = [
     "Array", "Case", "Error", "Exercise", "Label", "Needle", "Pose", "Probe", "Renderer", "Target",
-    "__version__", "read_session", "score", "simd_targets",
+    "TruthPlanes", "__version__", "read_session", "score", "simd_targets",
 ]
 
 
-def read_session(path):
-    """Poses, times and frame numbers of a recorded session, as a dict of arrays."""
-    import os
+_LAZY = ("data", "domain", "environment")
 
-    return _core.read_session(os.fspath(path))
+
+def __dir__():
+    return [*globals(), *_LAZY]
 
 
 def score(case, session, exercise=None):
@@ -50,15 +52,14 @@ def score(case, session, exercise=None):
     exercise  an Exercise; by default the one that the recording names
     """
     import json
-    import os
 
-    return json.loads(case._score(os.fspath(session), exercise))
+    return json.loads(Case._score(case, session, exercise))
 
 
 def __getattr__(name):
-    # Only programs that use environments pay for them.
-    if name == "environment":
+    # Only programs that use them pay for them, and need NumPy.
+    if name in _LAZY:
         import importlib
 
-        return importlib.import_module(".environment", __name__)
+        return importlib.import_module(f".{name}", __name__)
     raise AttributeError(f"module 'sonocase' has no attribute {name!r}")

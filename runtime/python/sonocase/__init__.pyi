@@ -5,12 +5,14 @@ from typing import Any, Iterable, Mapping, Optional, Sequence, Union
 import numpy as np
 import numpy.typing as npt
 
+from . import data as data
+from . import domain as domain
 from . import environment as environment
 from . import pose as Pose
 
 __version__: str
 
-Path = Union[str, "os.PathLike[str]"]
+Path = Union[str, bytes, "os.PathLike[str]", "os.PathLike[bytes]"]
 # Rigid motions, 4 x 4, mm. A needle: mannequin_from_needle (z from hub to tip, x to the side that
 # its bevel faces), or (tip, direction), where the bevel faces the probe.
 PoseArray = npt.ArrayLike
@@ -125,7 +127,7 @@ class Renderer:
     origin_px: tuple[float, float]
     def __init__(self, case: Case, exercise: Union[str, Exercise, None] = ...,
                  probe: Optional[Probe] = ..., needle: Optional[Needle] = ..., *, model: str = ...,
-                 machine: str = ..., effects: Union[str, Sequence[str], None] = ...,
+                 machine: Path = ..., effects: Union[str, Sequence[str], None] = ...,
                  size: tuple[int, int] = ..., seed: int = ..., renderer: str = ...,
                  scanlines: int = ..., samples: int = ..., looks: int = ...) -> None: ...
     def close(self) -> None: ...

@@ -20,6 +20,7 @@ import difflib
 import hashlib
 import json
 import math
+import operator
 import os
 import pathlib
 import re
@@ -30,7 +31,7 @@ import numpy as np
 from . import _core
 from . import pose as _pose
 from ._core import Case, Error, Probe, Renderer
-from .data import common_classes, in_classes
+from .data import checked_planes, common_classes, facts_in_classes, in_classes
 
 # Keys of a probe, and of a needle beside where it goes, with their limits: those of an exercise's file.
 PROBE = {"shape": None, **_core._PROBE_LIMITS}
@@ -39,21 +40,21 @@ PLANES = ("labels", "needle", "shadowed", "skin_depth_mm", "lesions", "rest_mm")
 
 # What a sample draws beside machine and probe: standard, and limits.
 _SAMPLE = {
-    "gain_db": (0.0, -60, 60),
-    "dynamic_range_db": (60.0, 20, 120),
+    "gain_db": (0.0, *_core._LIMITS["gain_db"]),
+    "dynamic_range_db": (60.0, *_core._LIMITS["dynamic_range_db"]),
     "pose.slide_mm": ([-15, 15], -500, 500),   # along the face and across it, one draw each
     "pose.tilt_deg": ([-15, 15], -90, 90),
     "pose.rock_deg": ([-10, 10], -90, 90),
     "pose.rotate_deg": ([-20, 20], -180, 180),
-    "pose.press_mm": (0.0, 0, 40),
+    "pose.press_mm": (0.0, *_core._LIMITS["press_mm"]),
     "pose.time_s": ([0, 8], 0, 1e6),
     "needle.share": (0.0, 0, 1),
     "needle.tip_depth_mm": ([20, 80], 0, 500),
     "needle.tip_across_mm": ([-10, 10], -200, 200),
     "needle.angle_deg": ([25, 65], 0, 90),     # between shaft and beam
     "needle.off_plane_mm": ([-2, 2], -100, 100),
-    "needle.tent_mm": (0.0, 0, 50),
-    "needle.drag_mm": (0.0, 0, 50),
+    "needle.tent_mm": (0.0, *_core._LIMITS["dent_mm"]),
+    "needle.drag_mm": (0.0, *_core._LIMITS["dent_mm"]),
 }
 _CONSOLE = ("gain_db", "dynamic_range_db")
 _TABLES = ("machine", "probe", "pose", "needle")
@@ -61,6 +62,21 @@ _OTHERS = ("chunk", "exercises", "model")
 # The machine's reader takes these as whole numbers alone.
 _WHOLE = ("machine.looks.count", "machine.looks.near_count", "machine.beam.lines",
           "machine.near_field.lines")
+
+
+def _native(value, key):
+    """As JSON has it: NumPy's numbers and arrays as Python's, paths as text."""
+    if isinstance(value, dict):
+        return {str(k): _native(v, f"{key}.{k}" if key else k) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_native(v, key) for v in value]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return _native(value.tolist(), key)
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    raise ValueError(f"{key}: of type {type(value).__name__}; expected a number, text, a list or a table")
 
 
 def _is_number(value):
@@ -152,14 +168,15 @@ class Domain:
     gain_db, dynamic_range_db   of the console
 
     Each but chunk is a value, [lowest, highest] or {"one_of": [...]}; a list of words is a choice.
+    Numbers and arrays of NumPy are taken as well.
     """
 
     def __init__(self, description):
         if not isinstance(description, dict):
             raise ValueError("description: expected a dict")
+        self.description = description = _native(description, "")
         for key in description:
             _refuse_unknown(key, [*_OTHERS, *_TABLES, *_CONSOLE])
-        self.description = json.loads(json.dumps(description))
         self.chunk = description.get("chunk", 16)
         if not isinstance(self.chunk, int) or isinstance(self.chunk, bool) or self.chunk < 1:
             raise ValueError(f"chunk: {self.chunk!r} is no whole number from 1 on")
@@ -185,6 +202,9 @@ class Domain:
         machine = description.get("machine", "")
         keyed = isinstance(machine, dict) and set(machine) != {"one_of"}
         self.machine_name = None if keyed else self._words("machine", "")
+        if self.machine_name is not None:  # files, for a process that stands elsewhere
+            self.machine_name.options = [os.path.abspath(name) if os.sep in name or name.endswith(".toml") else name
+                                         for name in self.machine_name.options]
         self.machine = [(path, _Choice(key, value))
                         for key, path, value in _leaves(machine, "machine")] if keyed else []
 
@@ -282,6 +302,19 @@ def _plain(value):
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def _whole(value, argument):
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise ValueError(f"{argument}: {value!r} is no whole number") from None
+
+
+def _size(size):
+    if isinstance(size, str) or not hasattr(size, "__len__") or len(size) != 2:
+        raise ValueError(f"size: {size!r} is no size: give (width, height)")
+    return tuple(_whole(n, "size") for n in size)
+
+
 class _Records:
     def __init__(self, frames):
         self._frames = frames
@@ -290,7 +323,8 @@ class _Records:
         return len(self._frames)
 
     def __getitem__(self, i):
-        return self._frames._record(range(len(self))[i])
+        numbers = range(len(self))[i]
+        return [self[n] for n in numbers] if isinstance(i, slice) else self._frames._record(numbers)
 
     def __iter__(self):
         return (self[i] for i in range(len(self)))
@@ -307,23 +341,22 @@ class DrawnFrames:
     facts         also "facts": the record, with the frame's truth
     classes       as of a DataSet
 
+    Bundles are known by their absolute paths, so that records and workers find them from any folder.
     The writers of sonocase.data take it in place of a DataSet; loaders' workers get it by pickling.
     """
 
     def __init__(self, cases, description, seed=1, count=1000, *, size=(256, 256),
                  planes=("labels", "needle"), facts=False, classes=None):
         self.domain = description if isinstance(description, Domain) else Domain(description)
-        self.seed, self.count, self.size, self.facts = int(seed), int(count), tuple(size), facts
+        self.seed, self.count, self.facts = _whole(seed, "seed"), _whole(count, "count"), facts
+        self.size = _size(size)
         if not 0 <= self.seed < 2**32:
             raise ValueError(f"seed: {seed} is out of range: give 0 to 2^32 - 1")
         if self.count < 1:
             raise ValueError(f"count: {count} is out of range: give 1 or more")
-        for plane in planes:
-            if plane not in PLANES and plane != "image":
-                raise ValueError(f"unknown plane '{plane}': expected some of {', '.join(PLANES)}")
-        self.planes = ("image", *[p for p in planes if p != "image"])
-        paths = [cases] if isinstance(cases, (str, os.PathLike)) else cases
-        self._case = _Choice("case", {"one_of": [os.fspath(p) for p in paths]})
+        self.planes = checked_planes(planes, PLANES)
+        paths = [cases] if isinstance(cases, (str, bytes, os.PathLike)) else cases
+        self._case = _Choice("case", {"one_of": [os.path.abspath(os.fsdecode(p)) for p in paths]})
         self._clear()
         opened = {path: self._opened(path) for path in self._case.options}
         self.classes, self._class_of = common_classes(
@@ -370,6 +403,7 @@ class DrawnFrames:
         self._clear()
 
     def __len__(self):
+        """Samples."""
         return self.count
 
     def __iter__(self):
@@ -434,6 +468,9 @@ class DrawnFrames:
                        "mannequin_from_probe": pose, "mannequin_from_needle": needle, "dent_mm": dent})
 
     def __getitem__(self, i):
+        """One frame, a dict of arrays; of a slice a list of them."""
+        if isinstance(i, slice):
+            return [self[n] for n in range(len(self))[i]]
         record = self.records[i]
         renderer = self._chunk(record["index"])[1]
         frame = {"image": picture(record, renderer)}
@@ -443,5 +480,6 @@ class DrawnFrames:
             if "labels" in frame:
                 frame["labels"] = in_classes(frame["labels"], self._class_of[record["case"]])
             if self.facts:
-                frame["facts"] = {**record, "truth": _plain(facts)}
+                truth = facts_in_classes(_plain(facts), self._class_of[record["case"]])
+                frame["facts"] = {**record, "truth": truth}
         return frame
