@@ -181,7 +181,7 @@ def test_coco_masks_are_the_planes(made, tmp_path):
     data = DataSet(made / "png")
     write_coco(data, tmp_path / "coco.json")
     coco = json.loads((tmp_path / "coco.json").read_text())
-    assert [c["name"] for c in coco["categories"]] == ["muscle", "vessel", "needle"]
+    assert [c["name"] for c in coco["categories"]] == ["muscle", "vessel", "needle", "lesion"]
     drawn = {i["id"]: np.zeros((48, 64), int) for i in coco["images"]}
     needles = {i["id"]: np.zeros((48, 64), bool) for i in coco["images"]}
     for a in coco["annotations"]:
@@ -201,6 +201,30 @@ def test_coco_masks_are_the_planes(made, tmp_path):
         np.testing.assert_array_equal(drawn[record["index"]], frame["labels"])
         np.testing.assert_array_equal(needles[record["index"]], frame["needle"] > 0)
     assert any(mask.any() for mask in needles.values())
+
+
+def test_lesions_are_in_every_form(with_cyst, tmp_path):
+    from conftest import BIN
+
+    recipe = tmp_path / "cyst.toml"
+    recipe.write_text('name = "cyst"\nsize = [64, 48]\n[machine]\nmodel = "physical"\n[[cases]]\n'
+                      f'bundle = "{with_cyst}"\nexercises = ["cyst"]\n'
+                      "[poses]\nslide_mm = 3\ntilt_deg = 1\nrock_deg = 1\nrotate_deg = 1\n")
+    subprocess.run([BIN / "sonoplay", "dataset", recipe, "-o", tmp_path / "set", "--frames", "60"], check=True)
+    data = DataSet(tmp_path / "set", planes=("lesions",), facts=True)
+    shown = {r["index"]: frame["lesions"] == 1 for r, frame in zip(data.records, data)}
+    assert any(mask.sum() > 5 for mask in shown.values())
+    assert main(["coco", str(tmp_path / "set"), "-o", str(tmp_path / "coco.json")]) == 0
+    coco = json.loads((tmp_path / "coco.json").read_text())
+    lesions = [a for a in coco["annotations"] if "attributes" in a]
+    assert {a["image_id"]: a["area"] for a in lesions} == {n: m.sum() for n, m in shown.items() if m.any()}
+    assert all(a["attributes"] == {"name": "vessel", "kind": "cyst"} for a in lesions)
+    assert main(["zarr", str(tmp_path / "set"), "-o", str(tmp_path / "set.zarr")]) == 0
+    assert (tmp_path / "set.zarr" / "lesions" / ".zarray").exists()
+    for file in (tmp_path / "set" / "frames").glob("lesions_*"):  # as written before there were any
+        file.unlink()
+    assert main(["coco", str(tmp_path / "set"), "-o", str(tmp_path / "old.json")]) == 0
+    assert main(["webdataset", str(tmp_path / "set"), "-o", str(tmp_path / "old-%d.tar")]) == 0
 
 
 def test_webdataset_holds_the_frames_and_is_the_same_bytes(made, tmp_path):
