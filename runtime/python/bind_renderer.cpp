@@ -586,12 +586,12 @@ void bind_renderer(py::module_& module) {
              "one per pose; dents: None, or one dent or None per pose. The pixels do not "
              "depend on `threads`. truth: names of planes; then (pictures, TruthPlanes, list of "
              "facts) is returned. Ctrl-C raises KeyboardInterrupt after the frames in hand.")
-        .def("truth", &PyRenderer::truth,
-             "planes"_a =
-                 py::make_tuple("labels", "needle", "shadowed", "skin_depth_mm", "lesions"),
-             "What the last frame shows: (TruthPlanes, facts). planes: those of TruthPlanes; "
-             "rest_mm only where it is asked for. facts: a dict of `visible` organs and `lesions` "
-             "with their areas, `targets` with their distances, the needle's `tip`, `contact`.")
+        .def(
+            "truth", &PyRenderer::truth,
+            "planes"_a = py::make_tuple("labels", "needle", "shadowed", "skin_depth_mm", "lesions"),
+            "What the last frame shows: (TruthPlanes, facts). planes: those of TruthPlanes; "
+            "rest_mm only where it is asked for. facts: a dict of `visible` organs and `lesions` "
+            "with their areas, `targets` with their distances, the needle's `tip`, `contact`.")
         .def_property_readonly(
             "contact", [](const PyRenderer& r) { return r.contact(); },
             "Whether the probe of the last frame touched the skin.")

@@ -153,8 +153,7 @@ void bind_truth(py::module_& module) {
         .def(py::pickle(
             [](const TruthArrays& t) {
                 return py::make_tuple(t.labels.object, t.needle.object, t.shadowed.object,
-                                      t.skin_depth_mm.object, t.lesions.object,
-                                      t.rest_mm.object);
+                                      t.skin_depth_mm.object, t.lesions.object, t.rest_mm.object);
             },
             [](const py::tuple& t) {
                 TruthArrays arrays;
