@@ -32,7 +32,8 @@ const plain = (html) => html.replaceAll('&amp;', '&').replaceAll('&lt;', '<').re
 // What the page asks for: texts and attributes of index.html, and each t('...') of the modules.
 export function page_words(page, attributes = ['title', 'aria-label', 'alt', 'placeholder']) {
     const found = new Set();
-    const html = read(page, 'index.html').replace(/<!--[\s\S]*?-->/g, '').replace(/[\s\S]*<body>/, '');
+    // Less what stands there in another language already.
+    const html = read(page, 'index.html').replace(/<!--[\s\S]*?-->/g, '').replace(/[\s\S]*<body>/, '').replace(/<(\w+) lang="[^"]*">[\s\S]*?<\/\1>/g, '');
     for (const [, text] of html.matchAll(/>([^<]*[A-Za-z][^<]*)</g)) found.add(plain(one_line(text)));
     for (const [, name, text] of html.matchAll(/ ([a-z-]+)="([^"]*)"/g))
         if (attributes.includes(name) && /[A-Za-z]/.test(text)) found.add(plain(one_line(text)));

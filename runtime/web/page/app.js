@@ -2,15 +2,18 @@
 
 // The pages and the ways between them: cases, scanning, after an attempt, scores.
 import {Core, PlainError, has_simd} from './core.js';
-import {download, file_name, keep_attempt, kept_attempts, launch_of, minutes, remove_attempts, send_statements, set_trainee, statement, trainee, words_of_sending} from './results.js';
+import {download, file_name, keep_attempt, kept_attempts, launch_of, minutes, recording_of, remove_attempt, remove_attempts, send_statements, set_trainee, statement, store_waits, trainee, when_store_opens, words_of_sending} from './results.js';
 import {PoseSource} from './poses.js';
 import {ScanPage, element} from './scan.js';
+import {key_words} from './scan_keys.js';
 import {ArrivingCase} from './arriving.js';
-import {inside_page, load_list, open_bytes} from './source.js';
+import {forget_other_cases, inside_page, is_case, load_list, open_bytes} from './source.js';
 import {begin_words, choose_language, exercise_texts, language_in_use, languages, missing_words, t} from './words.js';
 
 const $ = (id) => document.getElementById(id);
 const kBeforeS = 2;  // a moment is shown from this long before it, as in the window
+const kShortestAttemptS = 5;
+const kStartBytes = 65536;
 const kPages = ['start', 'course', 'scan', 'after', 'scores'];
 
 class App {
@@ -29,7 +32,7 @@ class App {
         click('practise', () => this.go_on('practice'));
         click('examine', () => this.go_on('exam'));
         click('next', () => this.choose_exercise(this.exercise + 1));
-        $('search').addEventListener('input', () => this.show_cases());
+        $('search').addEventListener('input', () => this.list_cases());
         click('open-about', () => $('about').showModal());
         for (const button of document.querySelectorAll('dialog .close')) button.addEventListener('click', () => button.closest('dialog').close());
         click('open-scores', () => this.show_scores());
@@ -37,7 +40,7 @@ class App {
         click('scores-remove', () => this.remove_scores());
         click('to-cases', () => this.to_cases());
         click('after-cases', () => this.show_first());
-        click('again', () => this.choose_exercise(this.exercise));
+        click('again', () => this.try_again());
         click('replay', () => this.show_moment(0, true));
         click('to-results', () => this.show('after'));
         click('save-recording', () => this.save(this.attempt, 'recording'));
@@ -45,6 +48,17 @@ class App {
         click('loading-stop', () => this.loading?.abort());
         click('browse', () => $('file').click());
         $('file').addEventListener('change', () => this.open_file($('file').files[0]));
+        // Reloading the page or closing it would lose the attempt without a word.
+        addEventListener('beforeunload', (e) => {
+            if (!this.attempt_runs()) return;
+            e.preventDefault();
+            e.returnValue = true;  // browsers of before 2024
+        });
+        when_store_opens(() => {
+            if ($('notice').textContent === waiting_words()) $('notice').textContent = '';
+            if (!$('start').hidden && this.list) this.show_cases();
+            else if (!$('scores').hidden) this.show_scores();
+        });
         $('trainee').value = trainee();
         $('trainee').addEventListener('change', () => { set_trainee($('trainee').value.trim()); this.course?.trainee_changed(); });
         addEventListener('dragover', (e) => { e.preventDefault(); $('drop').classList.add('over'); });
@@ -58,12 +72,14 @@ class App {
 
     async start() {
         $('drop').hidden = false;
+        show_own_keys();
         const asked = new URLSearchParams(location.search);
         if (asked.get('poses')) this.scan.poses = new PoseSource(asked.get('poses'), (words) => this.scan.tracker_says(words));
         const program = this.program();
         program.catch(() => {});  // said below
         try {
             this.list = await load_list();
+            forget_other_cases(this.list.cases);
             this.send_waiting();
             addEventListener('online', () => this.send_waiting());
         } catch (error) {
@@ -98,10 +114,9 @@ class App {
         this.program_made ??= (async () => {
             if (!globalThis.WebAssembly)
                 throw new PlainError(t('This browser has no WebAssembly, which the pictures need. Use a current browser.'));
-            const name = has_simd() ? 'sonoplay' : 'sonoplay-scalar';
             const inside = inside_page('program');
             try {
-                const module = inside ? await WebAssembly.compile(inside) : await compile_from(`${name}.wasm`);
+                const module = inside ? await WebAssembly.compile(inside) : await compile_from(program_file());
                 const core = await Core.create(module);
                 performance.mark('program-here');
                 return core;
@@ -130,9 +145,11 @@ class App {
         if (this.course?.single()) this.course.show();
         else this.show('start');
     }
+    // On the page that is shown.
     say(error) {
         console.error(error);
-        $('notice').textContent = error instanceof PlainError ? error.message
+        const shown = kPages.find((page) => !$(page).hidden);
+        $({scan: 'bar-notice', after: 'after-notice', scores: 'scores-words', course: 'course-notice'}[shown] ?? 'notice').textContent = error instanceof PlainError ? error.message
             : error instanceof WebAssembly.RuntimeError || error instanceof RangeError
                 ? t('There is not enough memory for this case. Close other pages and load this page again.')
                 : t('Something failed that should not: {}', error.message);
@@ -141,6 +158,11 @@ class App {
     // Each case with the ultrasound at its start, and its exercises with how the trainee stands.
     async show_cases() {
         if (this.list.cases.length) await this.read_kept();
+        this.list_cases();
+        if (store_waits() && !$('notice').textContent) $('notice').textContent = waiting_words();
+    }
+    // Those that the search finds, with what has been read.
+    list_cases() {
         const wanted = $('search').value.trim().toLowerCase();
         const shown = this.list.cases.filter((entry) => [entry.title, entry.name, ...entry.exercises.map(title_of)].some((one) => one.toLowerCase().includes(wanted)));
         const stands = this.standings(), focused = [...$('cases').querySelectorAll('button')].indexOf(document.activeElement);
@@ -173,16 +195,21 @@ class App {
             this.kept = [];
         }
     }
+    // Of whoever is named on the page of scores: several may share a browser.
+    own_attempts() {
+        const name = $('trainee').value.trim();
+        return (this.kept ?? []).filter((one) => !one.damaged && one.trainee === name);
+    }
     attempts_of(case_name, exercise) {
-        return (this.kept ?? []).filter((one) => one.case_name === case_name && one.exercise === exercise);
+        return this.own_attempts().filter((one) => one.case_name === case_name && one.exercise === exercise);
     }
     // How the trainee stands with each exercise of the site, by the window's rule, which the program has.
     standings() {
         const asked = this.list.cases.flatMap((entry) => entry.exercises.map((exercise) => ({entry, exercise})));
         if (!this.counts) return new Map();
-        const attempts = (this.kept ?? []).map(({case_name, exercise, started, passed, seed, score_text}) => {
-            const mm = JSON.parse(score_text).metrics?.final_tip_to_target_mm;
-            return {case: case_name, exercise, started, passed, seed: seed ?? 0, values: Number.isFinite(mm) ? {final_tip_to_target_mm: mm} : {}};
+        const attempts = this.own_attempts().map(({case_name, exercise, started, passed, seed, metrics}) => {
+            const mm = metrics.final_tip_to_target_mm;
+            return {case: case_name, exercise, started, passed: passed === true, seed: Number.isFinite(seed) ? seed : 0, values: Number.isFinite(mm) ? {final_tip_to_target_mm: mm} : {}};
         });
         const standings = this.counts.stand_with({attempts, asked: asked.map(({entry, exercise}) => (
             {case: entry.case ?? entry.title, exercise: exercise.name, mastery: exercise.mastery}))});
@@ -199,7 +226,7 @@ class App {
     // Where a trainee goes on: the exercise tried last, the one after it once that was passed; at first the first.
     next_exercise() {
         const all = this.list.cases.flatMap((entry) => entry.exercises.map((exercise) => ({entry, exercise})));
-        const last = (this.kept ?? []).at(-1);
+        const last = this.own_attempts().at(-1);
         const at = last ? all.findIndex(({entry, exercise}) => (entry.case ?? entry.title) === last.case_name && exercise.name === last.exercise) : -1;
         return all[Math.min(at + (last?.passed ? 1 : 0), all.length - 1)] ?? all[0];
     }
@@ -258,14 +285,33 @@ class App {
     }
     async open_file(file) {
         if (!file) return;
-        await this.load(file.name, async (program) => open_bytes(await program, new Uint8Array(await file.arrayBuffer()), file.name), null);
-        $('file').value = '';
+        try {
+            // What is no case need not be read wholly, and leaves the attempt alone: its first bytes tell the program enough.
+            const start = await bytes_of(file.slice(0, kStartBytes), file.name), whole = is_case(start);
+            const left = whole ? await this.may_leave() : {scored: ''};
+            if (!left) return;
+            const bytes = whole ? await bytes_of(file, file.name) : start;
+            await this.load(file.name, async (program) => open_bytes(await program, bytes, file.name), null, true);
+            if (left.scored) $(this.scan.shown() ? 'bar-notice' : 'after-notice').textContent += ` ${left.scored}`;
+        } catch (error) {
+            this.say(error);
+        } finally {
+            $('file').value = '';
+        }
     }
-    // how(program, progress, signal) gives the description of the opened case.
-    async load(title, how, exercise) {
-        this.loading?.abort();
-        this.arriving_case = null;
-        const loading = this.loading = new AbortController();
+    // how(program, progress, signal) gives the description of the opened case. at_once: it opens the case in one piece, so that
+    // the one that is open stays until then, and where that fails.
+    async load(title, how, exercise, at_once = false) {
+        const before = {loading: this.loading, arriving_case: this.arriving_case}, loading = new AbortController();
+        const leave_last = () => {
+            before.loading?.abort();
+            if (this.arriving_case === before.arriving_case) this.arriving_case = null;
+        };
+        const stays = at_once && before.arriving_case;
+        if (!stays) {
+            leave_last();
+            this.loading = loading;
+        }
         $('notice').textContent = '';
         $('loading').hidden = false;
         const progress = (part) => {
@@ -276,6 +322,10 @@ class App {
         try {
             const program = this.program();
             const description = await how(program, progress, loading.signal);
+            if (stays) {
+                leave_last();
+                this.loading = loading;
+            }
             this.core = await program;
             if (loading.signal.aborted) return;
             performance.mark('case-open');
@@ -283,16 +333,17 @@ class App {
             const index = description.exercises.findIndex((one) => one.name === exercise);
             if (exercise && index < 0) this.scan.notice(t('This case has no exercise named {}.', exercise));
             else this.scan.notice(description.warnings.join(' '));
-            this.choose_exercise(Math.max(index, 0));
+            await this.choose_exercise(Math.max(index, 0));
         } catch (error) {
             if (error.name !== 'AbortError') this.say(error);
         } finally {
-            if (this.loading === loading) $('loading').hidden = true;
+            if (this.loading === loading || stays) $('loading').hidden = true;
         }
     }
 
     async choose_exercise(index) {
-        if (this.scan.shown() && this.scan.values.attempt && !await this.ask(t('Leave this attempt? It will not be kept.'), t('Stay'), t('Leave'))) {
+        const left = this.attempt_runs() ? await this.may_leave() : {scored: ''};
+        if (!left) {
             $('exercise').value = this.exercise;
             return;
         }
@@ -309,18 +360,45 @@ class App {
             return;
         }
         this.scan.show(this.core, this.description, this.exercise);
+        if (left.scored) this.scan.notice(left.scored);
         $('picture').focus({preventScroll: true});
     }
+    // As the attempt before: an exam is tried again as an exam.
+    async try_again() {
+        const mode = this.attempt.exam ? 'exam' : 'practice';
+        await this.choose_exercise(this.exercise);
+        $('mode').value = mode;
+        this.scan.touched();
+    }
     async to_cases() {
-        if (this.scan.values.attempt && !await this.ask(t('Leave this attempt? It will not be kept.'), t('Stay'), t('Leave'))) return;
+        const left = await this.may_leave();
+        if (!left || left.scored) return;  // an exam that was left shows its result
         this.core.calls.drop_attempt();
         this.show_first();
+    }
+    attempt_runs() { return this.scan.shown() && this.scan.values.attempt === 1; }
+    // Before anything that ends the attempt. False: the trainee stays; {scored}: what became of an exam, which ends as it is
+    // and counts, as in the window; '': nothing ran, or it was a practice, which is not kept.
+    async may_leave() {
+        if (!this.attempt_runs()) return {scored: ''};
+        const counts = this.scan.exam() && this.scan.values.seconds >= kShortestAttemptS;
+        const words = counts ? t('Leave the exam? It ends as it is, and it counts.') : t('Leave this attempt? It will not be kept.');
+        if (!await this.ask(words, t('Stay'), t('Leave'))) return false;
+        if (!this.attempt_runs()) return {scored: ''};
+        if (!counts) {
+            this.core.calls.drop_attempt();
+            this.scan.values = this.core.values();
+            return {scored: ''};
+        }
+        if (!await this.score_attempt()) return false;
+        return {scored: [this.attempt.passed ? t('The exam was scored: passed.') : t('The exam was scored: not passed yet.'), $('after-notice').textContent].filter((one) => one).join(' ')};
     }
     help() { if (!$('help').open) $('help').showModal(); }
     download(...what) { download(...what); }
 
-    // True for yes.
-    ask(words, no, yes) {
+    // True for yes. One question at a time.
+    async ask(words, no, yes) {
+        if ($('ask').open) return false;
         $('ask-words').textContent = words;
         $('ask-no').textContent = no;
         $('ask-yes').textContent = yes;
@@ -361,38 +439,43 @@ class App {
     }
     async finish_attempt() {
         const {seconds} = this.scan.values;
-        if (seconds < 5 && !await this.ask(t('End this attempt? It has run for %s and will not be kept.', minutes(seconds)), t('Go on'), t('End'))) return;
-        if (seconds < 5) {
+        const short = seconds < kShortestAttemptS;
+        if (short && !await this.ask(t('End this attempt? It has run for %s and will not be kept.', minutes(seconds)), t('Go on'), t('End'))) return;
+        if (!short && this.scan.exam() && !await this.ask(t('End this exam? It is scored as it is.'), t('Go on'), t('End'))) return;
+        if (!this.attempt_runs()) return;
+        if (short) {
             this.core.calls.drop_attempt();
             this.scan.touched();
             return;
         }
         await this.score_attempt();
     }
+    // False: it goes on.
     async score_attempt() {
-        if (!await this.whole_case(t('Scores need the whole case, which is still loading. The attempt stands still.'))) return;
+        if (!await this.whole_case(t('Scores need the whole case, which is still loading. The attempt stands still.'))) return false;
         const exercise = this.description.exercises[this.exercise];
         let finished;
         try {
             finished = this.core.finish_attempt();
         } catch (error) {
             this.scan.notice(error.message);
-            return;
+            return false;
         }
         this.attempt = {started: this.started, started_ms: this.started_ms, seed: this.seed, trainee: $('trainee').value.trim(), case_name: this.description.case_name,
             exercise: exercise.name, title: exercise.title || exercise.name, passed: finished.score.passed, exam: this.scan.exam(),
             recording: finished.recording, score_text: finished.score_text};
         this.show_after(finished.score);
-        this.kept = [...this.kept ?? [], this.attempt];
+        this.kept = [...this.kept ?? [], {...this.attempt, metrics: finished.score.metrics}];
         const sending = this.send([['completed', this.attempt, finished.score], ['scored', this.attempt, finished.score]]);
         this.course?.attempt_done(this.attempt, finished.score);
         const kept = await keep_attempt(this.attempt);
         const sent = await sending;
         $('after-notice').textContent = [
-            kept ? '' : t('This browser keeps nothing: save recording and scores now.'),
+            kept ? '' : `${store_waits() ? `${waiting_words()} ` : ''}${t('This browser keeps nothing: save recording and scores now.')}`,
             words_of_sending(sent),
             ...finished.score.warnings].filter((words) => words).join(' ');
         this.settled = this.started;  // kept and sent, or said that it was not
+        return true;
     }
     send(which) {
         if (this.course?.takes(which)) return Promise.resolve({waiting: 0, refused: 0, status: 200});
@@ -443,7 +526,7 @@ class App {
     show_trend(trend) {
         const {case_name, exercise, started_ms} = this.attempt, before = this.attempts_of(case_name, exercise);
         const values = trend ? [...before.filter((one) => one.started_ms !== started_ms), this.attempt]
-            .map((one) => JSON.parse(one.score_text).metrics?.[trend.metric]).filter(Number.isFinite) : [];
+            .map((one) => (one.metrics ?? JSON.parse(one.score_text).metrics)?.[trend.metric]).filter(Number.isFinite) : [];
         $('trend-box').hidden = values.length < 2;
         if (values.length < 2) return;
         $('trend-title').textContent = t(trend.title);
@@ -496,29 +579,56 @@ class App {
     async show_scores() {
         this.show('scores');
         $('scores-title').focus();
-        const attempts = await kept_attempts();
+        const attempts = await kept_attempts().catch(() => null);
         const endpoint = this.list?.xapi ?? '';
         $('scores-words').textContent = [
             attempts ? attempts.length ? '' : t('No attempt yet.') : t('This browser keeps nothing here.'),
+            store_waits() ? waiting_words() : '',
+            attempts?.some((one) => one.in_page) ? t('Attempts without room are in this page alone: save them before you close it.') : '',
             endpoint ? t('This site sends results to the learning record store at {}.', endpoint) : ''].filter((words) => words).join(' ');
         $('scores-remove').hidden = !attempts?.length;
-        $('attempts').replaceChildren(...(attempts ?? []).reverse().map((attempt) => {
-            const line = row([attempt.started.replace('T', ' ').replace('Z', ''), attempt.case_name, attempt.exam ? `${attempt.title} (${t('exam')})` : attempt.title,
-                attempt.passed ? `✓ ${t('Passed')}` : `✗ ${t('Not passed yet')}`, '']);
-            for (const [what, words] of [['recording', t('Recording')], ['scores', t('Scores')]]) {
-                const button = element('button', words, {type: 'button'});
-                button.setAttribute('aria-label', `${words}: ${attempt.title}, ${attempt.started}`);
-                button.addEventListener('click', () => this.save(attempt, what));
-                line.lastElementChild.append(button, ' ');
-            }
-            return line;
-        }));
+        $('attempts').replaceChildren(...(attempts ?? []).reverse().map((one) => one.damaged ? this.damaged_line(one) : this.attempt_line(one)));
+    }
+    attempt_line(attempt) {
+        const title = this.title_of_attempt(attempt), when = local_time(attempt.started_ms);
+        const line = row([when, attempt.trainee || '–', attempt.case_name, attempt.exam ? `${title} (${t('exam')})` : title,
+            attempt.passed ? `✓ ${t('Passed')}` : `✗ ${t('Not passed yet')}`, ''], attempt.passed ? 'pass' : 'fail', {verdict: 4});
+        for (const [what, words] of [['recording', t('Recording')], ['scores', t('Scores')]]) {
+            const button = element('button', words, {type: 'button'});
+            button.setAttribute('aria-label', `${words}: ${title}, ${when}`);
+            button.addEventListener('click', () => this.save_kept(attempt, what));
+            line.lastElementChild.append(button, ' ');
+        }
+        return line;
+    }
+    damaged_line({id}) {
+        const line = row(['–', '–', '–', t('Damaged: this attempt cannot be read.'), '', ''], '', {});
+        const button = element('button', t('Remove'), {type: 'button'});
+        button.addEventListener('click', async () => {
+            await remove_attempt(id).catch((error) => console.error(error));
+            await this.show_scores();
+        });
+        line.lastElementChild.append(button);
+        return line;
+    }
+    // In the language in use, where the site or the open case has the exercise still.
+    title_of_attempt({case_name, exercise, title}) {
+        const entry = this.list?.cases.find((one) => (one.case ?? one.title) === case_name), listed = entry?.exercises.find((one) => one.name === exercise);
+        if (listed) return title_of(listed);
+        const open = this.description?.case_name === case_name ? this.description.exercises.find((one) => one.name === exercise) : null;
+        return (open && exercise_texts(open).title) || title;
+    }
+    async save_kept(attempt, what) {
+        const recording = what === 'recording' ? await recording_of(attempt) : null;
+        if (what === 'recording' && !recording) $('scores-words').textContent = t('This recording cannot be read: the browser has lost it.');
+        else this.save({...attempt, recording}, what);
     }
     async remove_scores() {
         if (!await this.ask(t('Remove all attempts and recordings from this browser?'), t('Keep'), t('Remove'))) return;
-        await remove_attempts();
-        this.course?.remove();
+        const removed = await remove_attempts().then(() => true, () => false);
+        if (removed) this.course?.remove();
         await this.show_scores();
+        if (!removed) $('scores-words').textContent = t('The browser removed nothing. Load the page again, then remove them.');
     }
     frame_shown() {
         this.arriving_case?.pump();
@@ -530,7 +640,34 @@ class App {
         const waits = this.scan.shown() && !this.scan.complete;
         if (waits || this.registered || this.list?.package || !('serviceWorker' in navigator) || !location.protocol.startsWith('http') || !isSecureContext) return;
         this.registered = true;
-        navigator.serviceWorker.register('worker.js').catch(() => {});  // without it the page works online
+        navigator.serviceWorker.register(`worker.js?program=${program_file()}`).catch(() => {});  // without it the page works online
+    }
+}
+
+const program_file = () => has_simd() ? 'sonoplay.wasm' : 'sonoplay-scalar.wasm';
+const waiting_words = () => t('Another tab has an older page of this site open: close it, so that attempts are kept.');
+// "2026-01-31 13:00", by the clock of this device; what is kept has UTC.
+function local_time(ms) {
+    const two = (n) => String(n).padStart(2, '0'), on = new Date(ms);
+    return `${on.getFullYear()}-${two(on.getMonth() + 1)}-${two(on.getDate())} ${two(on.getHours())}:${two(on.getMinutes())}`;
+}
+// Keys go by their position: where the browser tells what is printed on them, help and tips name that.
+async function show_own_keys() {
+    try {
+        const layout = await navigator.keyboard?.getLayoutMap();
+        if (!layout) return;
+        for (const one of $('help').querySelectorAll('dt')) one.textContent = key_words(one.textContent, layout);
+        for (const one of $('scan').querySelectorAll('[title], #picture'))
+            for (const name of ['title', 'aria-label']) if (one.hasAttribute(name)) one.setAttribute(name, key_words(one.getAttribute(name), layout));
+    } catch {
+        // Not told: the letters of an American keyboard, which the documents have too.
+    }
+}
+async function bytes_of(file, name) {
+    try {
+        return new Uint8Array(await file.arrayBuffer());
+    } catch {
+        throw new PlainError(t('{} cannot be read. Choose one file that is on this device.', name));
     }
 }
 
@@ -542,9 +679,10 @@ function missed_words(why) {
         not_answered: t('Not answered')}[why] ?? t('Not done');
 }
 
-function row(cells, last_class = '') {
+// places: of the columns that look otherwise.
+function row(cells, verdict_class = '', {number, verdict} = {number: 1, verdict: 3}) {
     const line = element('tr');
-    cells.forEach((text, n) => line.append(element('td', text, {className: n === 1 ? 'number' : n === 3 ? last_class : ''})));
+    cells.forEach((text, n) => line.append(element('td', text, {className: n === number ? 'number' : n === verdict ? verdict_class : ''})));
     return line;
 }
 
@@ -557,6 +695,8 @@ async function compile_from(url) {
         : WebAssembly.compile(await response.arrayBuffer());
 }
 
+$('notice').replaceChildren();  // "This page has not started"
+$('notice').classList.remove('unstarted');
 await begin_words();
 const app = new App();
 // For tests, and for pages that embed this one.

@@ -61,6 +61,7 @@ export class Core {
         core.calls = instance.exports;
         core.memory = instance.exports.memory;
         instance.exports._initialize?.();
+        core.away_s = 0;
         if (core.calls.value_count() !== kValues.length)
             throw new PlainError(t('Page and program are of different versions. Load the page again.'));
         return core;
@@ -139,6 +140,12 @@ export class Core {
         const at = this.calls.values(), from = new Float64Array(this.memory.buffer, at, kValues.length);
         return Object.fromEntries(kValues.map((name, n) => [name, from[n]]));
     }
+    // The program's clock stands still while nobody sees the page: what its calls take as now_s, here and below, is the
+    // browser's time, s, less what passed meanwhile.
+    stand_still(seconds) { this.away_s += seconds; }
+    // A picture of now; unseen: behind a frozen one.
+    frame(now_s) { return this.calls.frame(now_s - this.away_s); }
+    frame_unseen(now_s) { this.calls.frame_unseen(now_s - this.away_s); }
     // A view of the program's memory, valid until the next call.
     pixels() {
         const {width, height} = this.values();
@@ -155,7 +162,7 @@ export class Core {
         const at = this.calls.poses(), to = new Float64Array(this.memory.buffer, at, 32);
         to.set(probe);
         if (needle) to.set(needle, 16);
-        this.calls.put_tools(now_s, ...states.map((state) => kToolStates.indexOf(state)), kTrackers.indexOf(tracker));
+        this.calls.put_tools(now_s - this.away_s, ...states.map((state) => kToolStates.indexOf(state)), kTrackers.indexOf(tracker));
     }
     // Hands the probe back to the start; rows of mannequin_from_probe there.
     probe_home() {
@@ -165,7 +172,7 @@ export class Core {
     // seed: that targets and start are drawn with; 0: as written.
     start_attempt(trainee, started, now_s, seed = 0) {
         this.set_text(`${trainee.replaceAll('\n', ' ')}\n${started}`);
-        this.check(this.calls.start_attempt(now_s, seed));
+        this.check(this.calls.start_attempt(now_s - this.away_s, seed));
     }
     // The targets of the last picture, mm in the probe's frame: y is the distance to the plane.
     targets() {
@@ -238,7 +245,7 @@ export class Core {
     // Plays a sweep of the exercise; calls.watching() tells whether it still runs.
     watch(sweep, now_s) {
         this.set_text(sweep);
-        this.check(this.calls.watch(now_s));
+        this.check(this.calls.watch(now_s - this.away_s));
     }
     // The course of page_json.h, in a language ("en", "de").
     open_course(toml, language) {

@@ -52,7 +52,7 @@ export class Hands {
         this.scan.doppler.let_go();
         if (e.button === 0 && !e.shiftKey && this.pointers.size === 1 && this.scan.doppler.take(e)) return;
         if (e.pointerType !== 'mouse' && this.pointers.size === 1) {
-            this.long_press = setTimeout(() => this.scan.needle_to(e.clientX, e.clientY), kLongPressMs);
+            this.long_press = setTimeout(() => this.scan.bring_needle(e.clientX, e.clientY), kLongPressMs);
         }
     }
     up(e) {
@@ -149,7 +149,9 @@ export class Hands {
         if (this.held.size === 0) return;
         const calls = this.scan.core.calls, {shift, alt} = this.modifiers, by = (alt ? 0.25 : 1) * seconds;
         const x = this.axis('ArrowLeft', 'ArrowRight'), y = this.axis('ArrowDown', 'ArrowUp');
-        if (x || y) {
+        if ((x || y) && this.scan.measuring) {
+            this.scan.move_cross(30 * by * x, -30 * by * y);
+        } else if (x || y) {
             if (shift) calls.tilt(0.5 * by * x, 0.5 * by * y);
             else calls.slide(50 * by * x, 50 * by * y);
         }

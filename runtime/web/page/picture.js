@@ -64,8 +64,8 @@ export class Picture {
 
     // targets: in the probe's frame, those that may be shown; name: what lies under the pointer, or null;
     // more(on): draws further marks
-    // mark_mm: half of the face
-    draw_over(values, flip, mark_mm, measures, first, targets, name, more) {
+    // mark_mm: half of the face; cross: where keys measure, or null
+    draw_over(values, flip, mark_mm, measures, first, cross, targets, name, more) {
         const to = this.overlay.getContext('2d'), ratio = devicePixelRatio;
         to.setTransform(ratio, 0, 0, ratio, 0, 0);
         const height = this.overlay.height / ratio;
@@ -132,5 +132,10 @@ export class Picture {
         }
         more({to, x_of, y_of, line, say, flip, height});
         if (first) line(x_of(flip * first.x) - 5, y_of(first.z), x_of(flip * first.x) + 5, y_of(first.z));
+        if (!cross) return;
+        const cross_x = x_of(flip * cross.x), cross_y = y_of(cross.z);
+        line(cross_x - 9, cross_y, cross_x + 9, cross_y);
+        line(cross_x, cross_y - 9, cross_x, cross_y + 9);
+        if (first) say(`${Math.hypot(first.x - cross.x, first.z - cross.z).toFixed(1)} mm`, cross_x + 12, cross_y - 8);
     }
 }

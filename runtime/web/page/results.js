@@ -4,7 +4,8 @@
 
 import {t} from './words.js';
 
-const kDatabase = 'sonocase', kStore = 'attempts', kWaiting = 'statements';
+const kDatabase = 'sonocase', kStore = 'attempts', kRecordings = 'recordings', kWaiting = 'statements';
+const kLongestOpeningMs = 5000;
 
 function request(work) {
     return new Promise((done, failed) => {
@@ -12,50 +13,198 @@ function request(work) {
         work.onerror = () => failed(work.error);
     });
 }
+// A transaction keeps what was asked of it once it is complete, not before: where the browser is full, its requests
+// succeed and it is aborted.
+function complete(transaction) {
+    return new Promise((done, failed) => {
+        transaction.oncomplete = () => done();
+        transaction.onabort = transaction.onerror = () => failed(transaction.error ?? new Error('not kept'));
+    });
+}
+
+let opening;  // promise of the database; null: this browser keeps nothing here
+let waits_for_tab = false, on_late = () => {};
+// Another tab of this site has an older page open, and the store waits until it is closed.
+export const store_waits = () => waits_for_tab;
+// what(): called when the store was opened after all, once that tab is closed.
+export function when_store_opens(what) { on_late = what; }
+
+function open_database() {
+    opening ??= new Promise((done) => {
+        let late = false, timer = 0;
+        const give_up = () => {
+            late = true;
+            done(null);
+        };
+        const ask = (version) => {
+            const asked = indexedDB.open(kDatabase, version);
+            asked.onupgradeneeded = () => {
+                const db = asked.result;
+                if (!db.objectStoreNames.contains(kStore)) db.createObjectStore(kStore, {keyPath: 'id', autoIncrement: true});
+                if (!db.objectStoreNames.contains(kWaiting)) db.createObjectStore(kWaiting, {keyPath: 'key', autoIncrement: true});
+                // Recordings have megabytes: apart from what lists and standings are made of.
+                if (!db.objectStoreNames.contains(kRecordings)) db.createObjectStore(kRecordings, {keyPath: 'id'});
+            };
+            asked.onblocked = () => {
+                waits_for_tab = true;
+                give_up();
+            };
+            asked.onerror = () => {
+                // A newer page was here: what it has is opened as it is.
+                if (asked.error?.name === 'VersionError' && version) ask(undefined);
+                else give_up();
+            };
+            asked.onsuccess = () => {
+                clearTimeout(timer);
+                const db = asked.result;
+                const closed = () => { opening = undefined; };
+                db.onclose = closed;  // the browser cleared the site's data
+                db.onversionchange = () => {  // a newer page of this site, in another tab
+                    db.close();
+                    closed();
+                };
+                done(db);
+                if (!late) return;
+                opening = Promise.resolve(db);
+                waits_for_tab = false;
+                keep_what_waited().finally(() => on_late());
+            };
+        };
+        try {
+            ask(3);
+            timer = setTimeout(give_up, kLongestOpeningMs);
+        } catch {
+            give_up();
+        }
+    });
+    return opening;
+}
 
 // null: this browser keeps nothing here.
-let database;
-async function open_database() {
-    if (database !== undefined) return database;
+async function transaction_on(names, mode) {
+    const db = await open_database();
+    if (!db) return null;
     try {
-        const opening = indexedDB.open(kDatabase, 2);
-        opening.onupgradeneeded = () => {
-            const db = opening.result;
-            if (!db.objectStoreNames.contains(kStore)) db.createObjectStore(kStore, {keyPath: 'id', autoIncrement: true});
-            if (!db.objectStoreNames.contains(kWaiting)) db.createObjectStore(kWaiting, {keyPath: 'key', autoIncrement: true});
-        };
-        // Another page of this site still has the older version open: nothing waits for it.
-        opening.onblocked = () => opening.onerror?.();
-        database = await request(opening);
-    } catch {
-        database = null;
+        return db.transaction(names, mode);
+    } catch (error) {
+        // Closed in the meantime: once more, with what is there now.
+        if (error.name !== 'InvalidStateError') throw error;
+        opening = undefined;
+        const again = await open_database();
+        return again && again.transaction(names, mode);
     }
-    return database;
 }
-
 async function store(mode, name = kStore) {
-    const open = await open_database();
-    return open && open.transaction(name, mode).objectStore(name);
+    const transaction = await transaction_on(name, mode);
+    return transaction && transaction.objectStore(name);
+}
+// Of one store, in a transaction of its own; false: nothing is kept here.
+async function change(name, work) {
+    const to = await store('readwrite', name);
+    if (!to) return false;
+    const kept = complete(to.transaction), answer = request(work(to));
+    answer.catch(() => {});  // the transaction says it too
+    await kept;
+    return answer;
 }
 
+// Attempts that could not be kept: for as long as this page is open.
+let in_this_page = [];
+
+async function put_attempt({recording, ...rest}) {
+    const transaction = await transaction_on([kStore, kRecordings], 'readwrite');
+    if (!transaction) return false;
+    const kept = complete(transaction);
+    const adding = transaction.objectStore(kStore).add(rest);
+    adding.onsuccess = () => transaction.objectStore(kRecordings).put({id: adding.result, recording});
+    await kept;
+    return true;
+}
 // attempt: {started, started_ms, trainee, case_name, exercise, title, passed, recording, score_text}.
-// false: nothing was kept.
+// false: it was not kept, and stays in this page alone.
 export async function keep_attempt(attempt) {
+    const kept = await put_attempt(attempt).catch(() => false);
+    if (!kept) in_this_page.push(attempt);
+    return kept;
+}
+async function keep_what_waited() {
+    const waited = in_this_page;
+    in_this_page = [];
+    for (const attempt of waited) await keep_attempt(attempt);
+}
+
+// A record as lists and standings read it, of this version of the page or an older one; one that cannot be read has
+// `damaged` and its id alone.
+function readable(id, record) {
     try {
-        const to = await store('readwrite');
-        if (to) await request(to.add(attempt));
-        return Boolean(to);
+        const {recording, ...one} = record, score = JSON.parse(one.score_text), started_ms = Date.parse(one.started);
+        if ([one.case_name, one.exercise, one.started].every((part) => typeof part === 'string') && Number.isFinite(started_ms) && score && typeof score === 'object')
+            return {trainee: '', started_ms, title: one.exercise, ...one, id, metrics: score.metrics ?? {}};
     } catch {
-        return false;
+        // As one that lacks something.
+    }
+    return {id, damaged: true};
+}
+// Oldest first, without recordings. null: this browser keeps nothing, and neither does the page.
+export async function kept_attempts() {
+    const here = in_this_page.map((one) => ({...readable(undefined, one), in_page: one}));
+    const from = await store('readonly');
+    if (!from) return here.length ? here : null;
+    const ids = await request(from.getAllKeys()), to_move = [];
+    const kept = await Promise.all(ids.map((id) => new Promise((done) => {
+        const asked = from.get(id);
+        asked.onsuccess = () => {
+            const one = readable(id, asked.result);
+            if (asked.result?.recording && !one.damaged) to_move.push(id);
+            done(one);
+        };
+        asked.onerror = (event) => {
+            event?.preventDefault();  // the others are read all the same
+            done({id, damaged: true});
+        };
+    })));
+    move_recordings(to_move).catch(() => {});  // they are read where they are
+    return [...kept, ...here];
+}
+// Older pages kept recordings within attempts. One by one, so that a full browser holds up none.
+let moving = Promise.resolve();
+function move_recordings(ids) {
+    moving = moving.catch(() => {}).then(async () => {
+        for (const id of ids) {
+            const transaction = await transaction_on([kStore, kRecordings], 'readwrite');
+            if (!transaction) return;
+            const done = complete(transaction), asked = transaction.objectStore(kStore).get(id);
+            asked.onsuccess = () => {
+                if (!asked.result?.recording) return;
+                const {recording, ...rest} = asked.result;
+                transaction.objectStore(kRecordings).put({id, recording});
+                transaction.objectStore(kStore).put(rest);
+            };
+            await done;
+        }
+    });
+    return moving;
+}
+// The bytes of an attempt of kept_attempts(); null: they are not there, or cannot be read.
+export async function recording_of({id, in_page}) {
+    if (in_page) return in_page.recording;
+    try {
+        const transaction = await transaction_on([kStore, kRecordings], 'readonly');  // one: it may be put apart just now
+        const within = request(transaction.objectStore(kStore).get(id)), apart = request(transaction.objectStore(kRecordings).get(id));
+        within.catch(() => {});
+        return (await apart)?.recording ?? (await within)?.recording ?? null;
+    } catch {
+        return null;
     }
 }
-export async function kept_attempts() {
-    const from = await store('readonly');
-    return from ? request(from.getAll()) : null;
+export async function remove_attempt(id) {
+    await change(kStore, (from) => from.delete(id));
+    await change(kRecordings, (from) => from.delete(id));
 }
 export async function remove_attempts() {
-    const from = await store('readwrite');
-    if (from) await request(from.clear());
+    in_this_page = [];
+    await change(kStore, (from) => from.clear());
+    await change(kRecordings, (from) => from.clear());
 }
 
 export function trainee() {
@@ -168,8 +317,8 @@ export function statement(verb, attempt, score, launch = null) {
 let in_page = [], next_key = -1;
 async function wait_for_store(endpoint, statement) {
     try {
-        const to = await store('readwrite', kWaiting);
-        if (to) return await request(to.add({endpoint, statement}));
+        const key = await change(kWaiting, (to) => to.add({endpoint, statement}));
+        if (key !== false) return key;
     } catch {
         // No room: in the page.
     }
@@ -189,8 +338,7 @@ async function waiting_for(endpoint) {
 async function no_longer_waits(one) {
     in_page = in_page.filter(({key}) => key !== one.key);
     try {
-        const from = one.key > 0 && await store('readwrite', kWaiting);
-        if (from) await request(from.delete(one.key));
+        if (one.key > 0) await change(kWaiting, (from) => from.delete(one.key));
     } catch {
         // It is sent again; the store knows its id.
     }

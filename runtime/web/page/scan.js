@@ -12,6 +12,8 @@ import {exercise_texts, label_words, t} from './words.js';
 
 const kIdleRate = 40;  // pictures per second while nothing moves: tissue breathes, noise changes
 const kSliders = 8;
+const kLongestStepS = 0.1;   // that held keys move in
+const kLongestPauseS = 3;    // between two pictures of a page that is seen
 const kCamera = true;  // scripts/web-pack.mjs: false where it was built without
 const $ = (id) => document.getElementById(id);
 const kAnswer = 9;  // of the kinds of acts
@@ -93,12 +95,13 @@ export class ScanPage {
         this.number('focus', (cm) => this.set_image({focus_mm: 10 * cm}));
         this.number('gain', (db) => this.set_console({gain_db: db}));
         this.number('range', (db) => this.set_console({range_db: db}));
-        document.addEventListener('visibilitychange', () => { this.last_s = undefined; });
+        document.addEventListener('visibilitychange', () => { this.was_hidden = true; });
     }
     number(id, use) {
         const field = $(id);
         field.addEventListener('change', () => {
-            const value = Number(field.value), good = field.value !== '' && field.checkValidity();
+            // Any value of the range: the steps are those of the field's own arrows.
+            const value = Number(field.value), good = field.value !== '' && value >= Number(field.min) && value <= Number(field.max);
             field.setAttribute('aria-invalid', String(!good));
             if (good) use(value);
             else this.notice(t('%s: from %s to %s.', field.labels[0].textContent, field.min, field.max));
@@ -203,10 +206,14 @@ export class ScanPage {
     tick(ms) {
         if (!this.running) return;
         requestAnimationFrame((next) => this.tick(next));
-        const now_s = ms / 1000;
-        // After an hour in the background the hands have not moved for an hour.
-        const seconds = Math.min(now_s - (this.last_s ?? now_s), 0.1);
+        const now_s = ms / 1000, passed_s = now_s - (this.last_s ?? now_s), seconds = clamp(passed_s, 0, kLongestStepS);
         this.last_s = now_s;
+        // A tab in the background and a device asleep draw nothing, and an attempt that waits for its case does not go on:
+        // after an hour of it the hands have not moved for an hour, and no time has passed.
+        const away = this.was_hidden || passed_s > kLongestPauseS || passed_s < 0;
+        if (this.held) this.core.stand_still(passed_s);
+        else if (away) this.core.stand_still(passed_s - seconds);
+        this.was_hidden = false;
         if (!document.querySelector('dialog[open]')) this.hands.step(seconds);
         if (this.hands.held.size) this.moved = true;
         // An attempt goes on behind a frozen picture, where nobody sees it.
@@ -214,7 +221,7 @@ export class ScanPage {
         if ((!this.frozen || unseen) && !this.held) this.take_pose(now_s);
         if (unseen && !this.held && Math.abs(now_s - (this.unseen_s ?? 0)) >= 0.98 / kIdleRate) {
             this.unseen_s = now_s;
-            this.core.calls.frame_unseen(now_s);
+            this.core.frame_unseen(now_s);
         }
         if (this.playing) this.play(now_s);
         if (this.held) return;
@@ -251,13 +258,13 @@ export class ScanPage {
         this.moved = false;
         this.drawn_s = now_s;
         const before = performance.now();
-        this.status = this.frozen ? this.core.calls.frame_again(this.back) : this.core.calls.frame(now_s);
+        this.status = this.frozen ? this.core.calls.frame_again(this.back) : this.core.frame(now_s);
         this.values = this.core.values();
         this.picture.show(this.core.screen(), this.core.overlay(), this.doppler.colours());
         this.doppler.picture_drawn();
         this.view3d.picture_drawn(now_s);
         this.frame_ms = performance.now() - before;
-        this.picture.draw_over(this.values, this.flip_sign(), this.exercise().mark_mm, this.measures, this.first_point,
+        this.picture.draw_over(this.values, this.flip_sign(), this.exercise().mark_mm, this.measures, this.first_point, this.cross,
             this.shows_targets() ? this.core.targets() : [], this.name_there(), (on) => this.doppler.draw_over(on));
         this.say();
         this.say_guide();
@@ -306,7 +313,34 @@ export class ScanPage {
         const words = this.core.attempt_words();
         if (words.join() === this.events_said) return;
         this.events_said = words.join();
-        $('events').replaceChildren(...words.map((line) => Object.assign(document.createElement('li'), {textContent: line})));
+        $('events').replaceChildren(...words.map((line) => element('li', this.words_of_event(line))));
+    }
+    // What the program says of an event (runtime/recording/session_words.h), in the language in use.
+    words_of_event(line) {
+        const [, kind, of] = /^(Insertion|Reached:|Seen:|Touched:|Left:|Done:) (.*)$/.exec(line) ?? [];
+        const target = () => {
+            const [, number] = /^target (\d+)$/.exec(of) ?? [];
+            return number ? t('target %d', number) : of;
+        };
+        const label = () => {
+            const known = this.description.labels.find((one) => one.english === of);
+            return known ? label_words(known) : t(of);
+        };
+        const step = () => {
+            const n = this.core.procedure()?.steps.findIndex((one) => one.title === of) ?? -1;
+            return exercise_texts(this.exercise()).steps?.[n]?.title || of;
+        };
+        const depth = /^Needle out, was (\d+) mm deep$/.exec(line);
+        if (depth) return t('Needle out, was %d mm deep', depth[1]);
+        switch (kind) {
+            case 'Insertion': return t('Insertion %d', of);
+            case 'Reached:': return t('Reached: %s', target());
+            case 'Seen:': return t('Seen: %s', target());
+            case 'Touched:': return t('Touched: %s', label());
+            case 'Left:': return t('Left: %s', label());
+            case 'Done:': return t('Done: %s', step());
+            default: return t(line);
+        }
     }
     // Steps, question and tray of a procedure; rebuilt only when something of them has changed, so that a control in
     // focus stays.
@@ -376,7 +410,7 @@ export class ScanPage {
     exam() { return $('mode').value === 'exam'; }
     next_hint() {
         if (this.exam()) return;
-        this.hints = this.hints % (this.exercise().hints.length + 1) + 1;
+        this.hints = Math.min(this.hints + 1, this.exercise().hints.length + 1);
         this.say_hint();
         this.touched();
     }
@@ -479,6 +513,10 @@ export class ScanPage {
         else if (!calls.take_needle(in_plane ? 1 : 0)) this.notice(t('There is no skin beside the probe to put the needle on.'));
         this.touched();
     }
+    // A long press: the needle, aimed at that place, while it is outside. One that is in stays: fingers rest.
+    bring_needle(client_x, client_y) {
+        if (this.values.has_needle !== 1 || this.values.needle_depth_mm <= 0) this.needle_to(client_x, client_y);
+    }
     needle_to(client_x, client_y) {
         const at = this.picture.mm_at(client_x, client_y, this.values);
         if (!this.core.calls.needle_to(this.flip_sign() * at.x, at.z))
@@ -535,13 +573,23 @@ export class ScanPage {
 
     measure(on) {
         this.measuring = on;
-        this.first_point = null;
+        this.first_point = this.cross = null;
         $('measure').setAttribute('aria-pressed', String(on));
         this.touched();
     }
     measure_at(client_x, client_y) {
         const at = this.picture.mm_at(client_x, client_y, this.values);
-        at.x *= this.flip_sign();
+        this.measure_point({x: at.x * this.flip_sign(), z: at.z});
+    }
+    // By keys: a cross that the arrows move, from the middle of the picture on, and Enter sets a point where it is.
+    move_cross(across_mm, deeper_mm) {
+        const {width, height, mm_per_px, origin_x, origin_y, depth_mm} = this.values, flip = this.flip_sign();
+        const at = this.cross ?? {x: 0, z: depth_mm / 2}, shown_x = flip * at.x + across_mm;
+        this.cross = {x: flip * clamp(shown_x, -origin_x * mm_per_px, (width - 1 - origin_x) * mm_per_px),
+            z: clamp(at.z + deeper_mm, -origin_y * mm_per_px, (height - 1 - origin_y) * mm_per_px)};
+        this.touched();
+    }
+    measure_point(at) {
         if (this.first_point) {
             this.measures = [...this.measures, [this.first_point, at]].slice(-2);
             this.first_point = null;

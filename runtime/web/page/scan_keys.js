@@ -25,6 +25,7 @@ export function press_key(scan, code, {shift}, repeated) {
         KeyP: () => { scan.playing = scan.frozen && !scan.playing; },
         KeyN: () => scan.toggle_needle(!shift),
         KeyM: () => scan.measure(!scan.measuring),
+        Enter: () => scan.measuring && scan.cross && scan.measure_point(scan.cross),
         KeyC: () => scan.clear(),
         KeyV: () => scan.view3d.show_it(!scan.view3d.on),
         KeyF: () => scan.flip(),
@@ -45,6 +46,16 @@ export function press_key(scan, code, {shift}, repeated) {
     const act = stepping[code] ?? (repeated ? undefined : once[code]);
     act?.();
     return Boolean(act);
+}
+
+// Words that name keys by the letters of an American keyboard, with those of this one. layout: code to letter, as
+// navigator.keyboard.getLayoutMap() gives it.
+const kPunctuation = {',': 'Comma', '.': 'Period', '[': 'BracketLeft', ']': 'BracketRight', ';': 'Semicolon', '\'': 'Quote', '-': 'Minus', '=': 'Equal'};
+export function key_words(words, layout) {
+    return words.replace(/(?<![\p{L}\d-])[A-Z](?![\p{L}\d-])|(?<=^|\s)[,.[\];'=-](?=\s|$)/gu, (key) => {
+        const own = layout.get(kPunctuation[key] ?? `Key${key}`) ?? key, large = own.toUpperCase();
+        return large.length === 1 ? large : own;
+    });
 }
 
 // Keys of the console that act while they are held.

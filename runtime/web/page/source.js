@@ -38,14 +38,30 @@ export async function fetch_twice(url, options, good) {
 export async function load_list() {
     const inside = document.getElementById('site-list');
     if (inside) return JSON.parse(inside.textContent);
+    const response = await fetch_twice('cases.json', {cache: 'no-cache'}, (r) => r.ok);
+    const list = await response.json().catch(() => null);
+    if (!Array.isArray(list?.cases)) throw new PlainError(t('The list of cases is damaged. Tell the site\'s owner.'));
+    return list;
+}
+// Room for others: parts of cases that this site no longer has. Other sites of this host keep theirs.
+export async function forget_other_cases(entries) {
     try {
-        const response = await fetch_twice('cases.json', {cache: 'no-cache'}, (r) => r.ok);
-        return await response.json();
-    } catch (error) {
-        if (error instanceof SyntaxError) throw new PlainError(t('The list of cases is damaged. Tell the site\'s owner.'));
-        throw error;
+        const cache = entries.length && await case_cache();
+        if (!cache) return;
+        const here = new URL('.', location.href).href;
+        const used = new Set(entries.flatMap((one) => [`${one.file}?digest=${one.digest}`, `${one.segments}?digest=${one.segments_digest}`]));
+        for (const {url} of await cache.keys()) {
+            const name = url.startsWith(here) ? url.slice(here.length) : '/';
+            if (!name.split('?')[0].includes('/') && !used.has(name.split('&')[0])) await cache.delete(url);
+        }
+    } catch {
+        // They stay, then.
     }
 }
+
+const kCaseBegins = [0x89, 0x53, 0x4f, 0x4e, 0x4f, 0x0d, 0x0a, 0x1a];
+// By its first bytes.
+export const is_case = (bytes) => kCaseBegins.every((byte, n) => bytes[n] === byte);
 
 function from_base64(text) {
     const plain = atob(text);

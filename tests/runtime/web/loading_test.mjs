@@ -2,7 +2,7 @@
 
 // loading_test.mjs PROGRAM_FOLDER BIN_FOLDER: a case over the network, in Chromium: a picture before the case is whole,
 // servers and connections that fail, damaged parts, browsers that lack something, two tabs, a tab that slept.
-import {readFileSync} from 'node:fs';
+import {cpSync, readFileSync, writeFileSync} from 'node:fs';
 import {join} from 'node:path';
 import {pathToFileURL} from 'node:url';
 import {site_server} from '../../../scripts/web-serve.mjs';
@@ -62,6 +62,39 @@ async function with_page(fault, visit, {before = '', query = '?case=demo', goes_
 async function whole(page) {
     await page.until(`${kFrames} > 0 && !sonoplay.app.arriving() && ${kLeft} === 0`);
     await page.value('sonoplay.app.arriving_case.whole');  // and kept
+}
+
+// A copy of the site that a test may change, on a server of its own. answer(request, response): true where it has answered;
+// headers(url): more of them.
+async function with_site(visit, {answer = () => false, headers = () => ({}), before = ''} = {}) {
+    const its = folder();
+    cpSync(site, its, {recursive: true});
+    const server = site_server(its, (request, response) => {
+        const write = response.writeHead.bind(response);
+        response.writeHead = (status, given) => write(status, {...given, ...headers(request.url)});
+        return answer(request, response);
+    });
+    await new Promise((done) => server.listen(0, '127.0.0.1', done));
+    const stop = () => { server.closeAllConnections?.(); server.close(); };
+    const page = await browser.page(), url = `http://127.0.0.1:${server.address().port}/`;
+    try {
+        if (before) {
+            await page.send('Page.enable');
+            await page.send('Page.addScriptToEvaluateOnNewDocument', {source: before});
+        }
+        await visit(page, {url, its, stop, offline: async () => {
+            stop();
+            await page.send('Network.emulateNetworkConditions', {offline: true, latency: 0, downloadThroughput: -1, uploadThroughput: -1});
+        }});
+    } finally {
+        await page.close();
+        stop();
+    }
+}
+// Once the page works offline.
+async function worker_is_ready(page) {
+    await page.value('navigator.serviceWorker.ready.then(() => true)');
+    await page.until('navigator.serviceWorker.controller');
 }
 
 // The page's pictures of three poses are those of the whole case in node, by their digests.
@@ -277,6 +310,74 @@ await run_tests({
             await expect_right_pixels(page);
             expect(page.requests.some((one) => one.endsWith('sonoplay-scalar.wasm')), 'the scalar program');
         }, {before: 'WebAssembly.validate = () => false;'});
+    },
+    async after_one_visit_it_works_offline_with_or_without_simd_and_with_its_cards_pictures() {
+        for (const before of ['', 'WebAssembly.validate = () => false;']) {
+            await with_site(async (page, {url, offline}) => {
+                await page.open(`${url}?case=demo`);
+                await whole(page);
+                await worker_is_ready(page);
+                await offline();
+                await page.open(`${url}?case=demo`);
+                await whole(page);
+                await page.value('sonoplay.app.to_cases()');
+                await page.until('document.querySelector("#cases img").naturalWidth > 0');
+            }, {before});
+        }
+    },
+    async a_new_page_has_its_own_program_also_from_a_host_that_lets_browsers_keep_files() {
+        await with_site(async (page, {url, its}) => {
+            const title = 'document.getElementById("start-title").textContent';
+            await page.open(url);
+            await page.until('sonoplay.app.ready');
+            await worker_is_ready(page);
+            const change = (name, ...by) => writeFileSync(join(its, name), readFileSync(join(its, name), 'utf8').replaceAll(...by));
+            change('index.html', 'Ultrasound cases', 'Newer cases');
+            change('sonoplay.js', '// SPDX', 'globalThis.newer = true;\n// SPDX');
+            change('worker.js', /(kCache = `.*?)[0-9a-f]{16}/g, '$1newer');
+            await page.open(url);
+            await page.until('caches.keys().then((names) => { globalThis.names = names; }) && names.some((one) => one.endsWith("newer")) && names.length === names.filter((one) => one.endsWith("newer") || one.startsWith("sonocase-cases")).length', 30);
+            await page.open(url);
+            await page.until(`sonoplay.app.ready && ${title} === 'Newer cases'`);
+            expect_equal(await page.value('globalThis.newer ?? false'), true, 'its own script');
+        }, {headers: (path) => /\.(js|css|wasm)$/.test(path) && !path.endsWith('worker.js') ? {'Cache-Control': 'public, max-age=600'} : {}});
+    },
+    async what_a_network_shows_in_place_of_the_list_is_not_kept() {
+        let portal = false;
+        const answer = (request, response) => {
+            if (!portal || !request.url.startsWith('/cases.json')) return false;
+            response.writeHead(200, {'Content-Type': 'text/html'}).end('<html>Please sign in</html>');
+            return true;
+        };
+        await with_site(async (page, {url, offline}) => {
+            await page.open(url);
+            await page.until('sonoplay.app.ready');
+            await worker_is_ready(page);
+            portal = true;
+            await page.open(url);
+            await page.until('document.querySelectorAll("#cases li").length === 1');
+            await offline();
+            await page.open(url);
+            await page.until('document.querySelectorAll("#cases li").length === 1');
+        }, {answer});
+    },
+    async a_full_browser_opens_cases_from_the_network_and_lets_go_of_those_that_the_site_no_longer_has() {
+        await with_site(async (page, {url}) => {
+            await page.open(url);
+            await page.until('sonoplay.app.ready');
+            await worker_is_ready(page);
+            const kept = `caches.open('sonocase-cases-2').then((cache) => cache.keys()).then((keys) => keys.map((one) => one.url.split('/').slice(3).join('/')).sort().join())`;
+            await page.value(`caches.open('sonocase-cases-2').then((cache) => Promise.all(['gone-01234567.sonocase?digest=0&group=0', 'gone-01234567.sonocase.segments?digest=0', 'other/gone.sonocase?digest=0&group=0']
+                .map((key) => cache.put(key, new Response('x')))))`);
+            await page.open(url);
+            await page.until('sonoplay.app.ready');
+            await page.until(`(${kept}.then((is) => { globalThis.is = is; }), globalThis.is === 'other/gone.sonocase?digest=0&group=0')`, 10);
+            const {usage} = await page.value('navigator.storage.estimate()');
+            await page.send('Storage.overrideQuotaForOrigin', {origin: url.replace(/\/$/, ''), quotaSize: Math.max(1, usage - 1000)});
+            await page.open(`${url}?case=demo`);
+            await whole(page);
+            await expect_right_pixels(page);
+        });
     },
     async without_webgl_nothing_is_missing() {
         const before = `const get = HTMLCanvasElement.prototype.getContext;

@@ -113,10 +113,11 @@ await run_tests({
         await scanning(page);
         await page.value('sonoplay.app.description.exercises[0].hints = ["Look for the vessel.", "It is round."]');
         const hint = 'document.getElementById("hint").textContent', tip = 'document.getElementById("value-tip").textContent';
-        for (const words of ['Hint 1 of 2: Look for the vessel.', 'Hint 2 of 2: It is round.', 'The target is shown.', 'Hint 1 of 2: Look for the vessel.']) {
+        for (const words of ['Hint 1 of 2: Look for the vessel.', 'Hint 2 of 2: It is round.', 'The target is shown.', 'The target is shown.']) {
             await page.key('KeyH');
             await page.until(`${hint} === ${JSON.stringify(words)}`);
         }
+        expect_equal(await page.value('sonoplay.app.scan.hints'), 3, 'hints used, however often the key is pressed');
         await page.key('KeyN');
         await page.key('KeyB');
         await page.until(`sonoplay.app.scan.values.attempt && ${tip}.includes('mm')`);
@@ -130,6 +131,328 @@ await run_tests({
         expect_equal(await page.value(hint), '', 'no hint in an exam');
         expect_equal(await page.value(tip), '–', 'no distance in an exam');
         await page.close();
+    },
+    async an_exam_ends_when_it_is_meant_to_and_counts_when_it_is_left() {
+        const page = await browser.page();
+        await scanning(page);
+        const text = (id) => page.value(`document.getElementById("${id}").textContent`), asked = 'document.getElementById("ask").open';
+        const exam = async () => {
+            await page.value('document.getElementById("mode").value = "exam"');
+            await page.key('KeyB');
+            await page.until(`${seconds_attempt} > 5.2`);
+        };
+        await exam();
+        await page.key('KeyB');
+        await page.until(asked);
+        expect_equal(await text('ask-words'), 'End this exam? It is scored as it is.', 'asked');
+        await page.click('ask-no');
+        await page.until(`!${asked} && ${seconds_attempt} > ${await page.value(seconds_attempt)}`);
+        await page.key('KeyB');
+        await page.until(asked);
+        await page.click('ask-yes');
+        await page.until('!document.getElementById("after").hidden && sonoplay.app.settled === sonoplay.app.started');
+        await page.click('again');
+        await page.until('!document.getElementById("scan").hidden');
+        expect_equal(await page.value('document.getElementById("mode").value'), 'exam', 'an exam again');
+        // Left for the cases: scored, and its result is shown.
+        await exam();
+        await page.click('to-cases');
+        await page.until(asked);
+        expect_equal(await text('ask-words'), 'Leave the exam? It ends as it is, and it counts.', 'asked');
+        await page.click('ask-yes');
+        await page.until('!document.getElementById("after").hidden && sonoplay.app.settled === sonoplay.app.started');
+        await page.click('after-cases');
+        await page.until('document.querySelector("#cases button").textContent.includes("2 of 2")');
+        // Left for another exercise, here the same one again: scored, and said there.
+        await page.value('document.querySelector("#cases button").click()');
+        await page.until(`sonoplay.app.scan.shown()`);
+        await exam();
+        await page.key('F5');
+        await page.until(asked);
+        await page.click('ask-yes');
+        await page.until('document.getElementById("bar-notice").textContent.startsWith("The exam was scored: ")');
+        expect_equal(await page.value('sonoplay.app.scan.shown() && sonoplay.app.scan.values.attempt'), 0, 'the exercise is open');
+        // To load the page again loses an attempt, and is asked for.
+        await page.key('KeyB');
+        await page.until(`${seconds_attempt} > 0.1`);
+        await page.open(`${url}?case=small`);
+        expect_equal(page.dialogs.join(), 'beforeunload', 'asked');
+        await page.until(`${kFrames} > 0`);
+        await page.open(url);
+        expect_equal(page.dialogs.join(), 'beforeunload', 'without an attempt it is not');
+        expect_equal(page.errors.join(), '', 'errors on the console');
+        await page.close();
+    },
+    async a_file_dropped_in_an_attempt_asks_first_and_one_that_is_no_case_leaves_it_alone() {
+        const page = await browser.page();
+        await scanning(page);
+        const bytes = [...readFileSync(case_file)], bar = 'document.getElementById("bar-notice").textContent', asked = 'document.getElementById("ask").open';
+        const drop = (content, name) => page.value(`(() => {
+            const dropped = new DataTransfer();
+            dropped.items.add(new File([new Uint8Array(${JSON.stringify(content)})], '${name}'));
+            dispatchEvent(new DragEvent('drop', {dataTransfer: dropped}));
+        })()`);
+        const goes_on = async () => page.until(`${kFrames} > ${await page.value(kFrames)} + 3 && sonoplay.app.scan.values.attempt === 1`);
+        await page.key('KeyB');
+        await page.until(`${seconds_attempt} > 0.5`);
+        await drop([...Buffer.from('holiday'.repeat(20000))], 'letter.pdf');
+        await page.until(`${bar}.includes('letter.pdf')`);
+        await goes_on();
+        await drop(bytes, 'other.sonocase');
+        await page.until(asked);
+        expect_equal(await page.value('sonoplay.app.may_leave()'), false, 'one question at a time');
+        await page.click('ask-no');
+        await goes_on();
+        expect_equal(await page.value('document.getElementById("case-title").textContent'), await page.value('sonoplay.app.description.title'), 'the case stays');
+        await page.until(`${seconds_attempt} > 5.2`);
+        await page.key('KeyB');
+        await page.until('!document.getElementById("after").hidden');
+        await page.click('again');
+        // Damaged behind its first bytes: the attempt was left, the exercise stays.
+        await page.key('KeyB');
+        await page.until(`${seconds_attempt} > 0.1`);
+        await drop(bytes.slice(0, 5000), 'cut.sonocase');
+        await page.until(asked);
+        await page.click('ask-yes');
+        await page.until(`${bar}.includes('cut.sonocase') && sonoplay.app.scan.values.attempt === 0`);
+        await page.until(`${kFrames} > ${await page.value(kFrames)} + 3`);
+        // A good one opens.
+        await page.key('KeyB');
+        await page.until('sonoplay.app.scan.values.attempt === 1');
+        await drop(bytes, 'other.sonocase');
+        await page.until(asked);
+        await page.click('ask-yes');
+        await page.until('sonoplay.app.scan.values.attempt === 0 && sonoplay.app.arriving_case === null');
+        await page.until(`${kFrames} > ${await page.value(kFrames)} + 3`);
+        await page.close();
+    },
+    async a_tab_in_the_background_does_not_spend_the_time_of_an_attempt() {
+        const page = await browser.page();
+        await scanning(page);
+        await page.key('KeyB');
+        await page.until(`${seconds_attempt} > 0.5`);
+        const seconds = await page.value(`(async () => {
+            const {scan} = sonoplay.app, hide = (hidden) => {
+                Object.defineProperty(document, 'visibilityState', {value: hidden ? 'hidden' : 'visible', configurable: true});
+                document.dispatchEvent(new Event('visibilitychange'));
+            };
+            const {tick} = scan, before = scan.values.seconds, next = () => new Promise((done) => setTimeout(done, 50));
+            // No pictures for 2 s, as in a tab that nobody sees.
+            hide(true);
+            scan.tick = () => {};
+            await new Promise((done) => setTimeout(done, 2000));
+            hide(false);
+            scan.tick = tick;
+            scan.tick(performance.now());
+            const hidden = scan.values.seconds - before;
+            // Nor while an attempt waits for the rest of its case.
+            scan.held = true;
+            await new Promise((done) => setTimeout(done, 2000));
+            const held_from = scan.values.seconds;
+            scan.held = false;
+            for (let n = 0; n < 60 && scan.values.seconds === held_from; ++n) await next();
+            return {hidden, held: scan.values.seconds - held_from};
+        })()`);
+        expect(seconds.hidden < 1.5, `hidden: ${seconds.hidden} s`);
+        expect(seconds.held < 1.5, `held: ${seconds.held} s`);
+        await page.close();
+    },
+    async a_damaged_record_and_another_trainees_do_not_disturb_and_times_are_local() {
+        const page = await browser.page();
+        await page.send('Emulation.setTimezoneOverride', {timezoneId: 'Australia/Sydney'});
+        await page.open(url);
+        await page.until('sonoplay.app.ready');
+        await page.value(`new Promise((done) => {
+            const opening = indexedDB.open('sonocase');
+            opening.onsuccess = () => {
+                const on = opening.result.transaction('attempts', 'readwrite'), to = on.objectStore('attempts');
+                const one = {case_name: sonoplay.app.list.cases[0].case ?? sonoplay.app.list.cases[0].title, exercise: 'scan', title: 'As it was called', passed: true, started: '2026-01-31T12:00:00Z', recording: new Uint8Array([1, 2, 3])};
+                to.add({...one, trainee: 'Ada', score_text: '{"metrics":{}}'});
+                to.add({...one, score_text: '{"metr'});
+                to.add({score_text: '{}'});
+                on.oncomplete = () => { opening.result.close(); done(); };
+            };
+        })`);
+        const standing = 'document.querySelector("#cases button").textContent';
+        await page.open(`${url}?lang=de`);
+        await page.until(`sonoplay.app.ready && ${standing}.includes("Nicht versucht")`);
+        await page.click('open-scores');
+        await page.until('document.querySelectorAll("#attempts tr").length === 3');
+        const title = await page.value('sonoplay.app.list.cases[0].exercises[0].title');
+        const cells = await page.value('[...document.querySelectorAll("#attempts tr:last-child td")].map((one) => one.textContent)');
+        expect_equal(cells.slice(0, 2).join(), '2026-01-31 23:00,Ada', 'local time, and whose');
+        expect_equal(cells[3], title, 'the title of the list');
+        const saved = await page.value(`(async () => {
+            let saved;
+            sonoplay.app.save = (attempt) => { saved = attempt; };
+            await sonoplay.app.save_kept(sonoplay.app.kept[0], 'recording');
+            return [...saved.recording];
+        })()`);
+        expect_equal(saved.join(), '1,2,3', 'its recording');
+        for (const left of [2, 1]) {
+            await page.value('[...document.querySelectorAll("#attempts tr")].find((one) => one.textContent.includes("Beschädigt")).querySelector("button").click()');
+            await page.until(`document.querySelectorAll("#attempts tr").length === ${left}`);
+        }
+        await page.value('(() => { const of = document.getElementById("trainee"); of.value = "Ada"; of.dispatchEvent(new Event("change")); })()');
+        await page.click('scores-back');
+        await page.until(`${standing}.includes("Bestanden")`);
+        // What the browser clears is not there, and is kept again from then on.
+        await page.send('Storage.clearDataForOrigin', {origin: url.replace(/\/$/, ''), storageTypes: 'indexeddb'});
+        await page.click('open-scores');
+        await page.until('document.querySelectorAll("#attempts tr").length === 0');
+        expect_equal(await page.value('document.getElementById("scores-words").textContent'), 'Noch kein Versuch.', 'nothing is there');
+        expect_equal(await page.value('[...sonoplay.words.missing].join(" | ")'), '', 'words without German');
+        expect_equal(page.errors.join(), '', 'errors on the console');
+        await page.close();
+    },
+    async an_attempt_without_room_is_said_and_stays_in_the_page() {
+        const page = await browser.page();
+        await scanning(page);
+        // As a full browser has it: requests succeed, and the transaction does not.
+        await page.value(`(() => {
+            const {add} = IDBObjectStore.prototype;
+            IDBObjectStore.prototype.add = function (row) {
+                const asked = add.call(this, row);
+                queueMicrotask(() => asked.addEventListener('success', () => asked.transaction.abort()));  // behind the page's own
+                return asked;
+            };
+        })()`);
+        await page.key('KeyB');
+        await page.until(`${seconds_attempt} > 5.2`);
+        await page.key('KeyB');
+        await page.until('document.getElementById("after-notice").textContent.includes("keeps nothing: save recording and scores now")');
+        await page.click('after-cases');
+        await page.until('document.querySelector("#cases button").textContent.includes("1")');
+        await page.click('open-scores');
+        await page.until('document.querySelectorAll("#attempts tr").length === 1');
+        expect((await page.value('document.getElementById("scores-words").textContent')).includes('in this page alone'), 'said here too');
+        await page.close();
+    },
+    async an_older_page_in_another_tab_leaves_the_new_one_its_cases() {
+        const old = await browser.page(), page = await browser.page(1280, 720, old.context);
+        await old.open(`${url}words-de.json`);
+        await old.value(`new Promise((done) => {
+            const opening = indexedDB.open('sonocase', 2);
+            opening.onupgradeneeded = () => {
+                opening.result.createObjectStore('attempts', {keyPath: 'id', autoIncrement: true});
+                opening.result.createObjectStore('statements', {keyPath: 'key', autoIncrement: true});
+            };
+            opening.onsuccess = () => { globalThis.kept_open = opening.result; done(); };
+        })`);
+        await page.open(url);
+        const notice = 'document.getElementById("notice").textContent';
+        await page.until(`sonoplay.app.ready && document.querySelectorAll("#cases button").length === 1 && ${notice}.includes("older page")`);
+        await old.close();
+        await page.until(`!${notice}.includes("older page")`);
+        await page.close();
+    },
+    async numbers_between_the_steps_a_resting_finger_and_measuring_by_keys() {
+        const page = await browser.page();
+        await scanning(page);
+        const values = 'sonoplay.app.scan.values';
+        for (const [id, number] of [['gain', 3.4], ['range', 62], ['depth', 12.5], ['focus', 4.2]])
+            await page.value(`(() => { const of = document.getElementById('${id}'); of.value = ${number}; of.dispatchEvent(new Event('change')); })()`);
+        expect_equal(await page.value(`[sonoplay.app.scan.console.gain_db, sonoplay.app.scan.console.range_db, ${values}.depth_mm, ${values}.focus_mm].join()`), '3.4,62,125,42', 'taken');
+        expect_equal(await page.value('document.getElementById("bar-notice").textContent'), '', 'nothing to say');
+        await page.value('(() => { const of = document.getElementById("depth"); of.value = 99; of.dispatchEvent(new Event("change")); })()');
+        expect((await page.value('document.getElementById("bar-notice").textContent')).includes('from 3 to 30'), 'out of range');
+        // A cross that arrows move; Enter sets both points.
+        await page.value('document.getElementById("picture").focus()');
+        const before = await page.value('sonoplay.app.core.calls.hands_pose() && sonoplay.frame().pixels.length');
+        await page.key('KeyM');
+        await page.key('Enter');
+        expect_equal(await page.value('sonoplay.app.scan.first_point'), null, 'no point without a cross');
+        const move = async (code, until) => {
+            await page.key(code, 0, 'down');
+            await page.until(until);
+            await page.key(code, 0, 'up');
+        };
+        await move('ArrowDown', 'sonoplay.app.scan.cross?.z > 65');
+        await page.key('Enter');
+        const first = await page.value('sonoplay.app.scan.first_point');
+        await move('ArrowRight', `sonoplay.app.scan.cross.x > ${first.x} + 5`);
+        await page.key('Enter');
+        const [[a, b]] = await page.value('sonoplay.app.scan.measures');
+        expect(Math.abs(a.z - b.z) < 1e-9 && b.x > a.x + 5, 'a line across');
+        await page.key('KeyM');
+        expect_equal(await page.value('sonoplay.app.scan.cross'), null, 'no cross afterwards');
+        expect(before > 0, 'a picture');
+        // A finger that rests on the picture leaves a needle that is in.
+        await page.key('KeyN');
+        await move('KeyW', `${values}.needle_depth_mm > 20`);
+        const {x, y} = await page.value('(({left, top, width, height}) => ({x: left + 0.35 * width, y: top + 0.5 * height}))(document.getElementById("picture").getBoundingClientRect())');
+        await page.value('sonoplay.app.scan.needle_to = () => { globalThis.aimed = true; }');
+        const rest = async (seconds) => {
+            await page.send('Input.dispatchTouchEvent', {type: 'touchStart', touchPoints: [{x, y}]});
+            await new Promise((done) => setTimeout(done, 1000 * seconds));
+            await page.send('Input.dispatchTouchEvent', {type: 'touchEnd', touchPoints: []});
+        };
+        await rest(0.9);
+        expect_equal(await page.value('globalThis.aimed ?? false'), false, 'it stays');
+        await move('KeyS', `${values}.needle_depth_mm < 0`);
+        await rest(0.9);
+        await page.until('globalThis.aimed');
+        await page.close();
+    },
+    async help_begins_with_its_heading_and_names_this_keyboards_keys() {
+        const page = await browser.page(1280, 600);
+        await page.send('Page.enable');
+        await page.send('Page.addScriptToEvaluateOnNewDocument', {source: `Object.defineProperty(navigator, 'keyboard', {value: {getLayoutMap: async () =>
+            new Map([['KeyZ', 'y'], ['KeyY', 'z'], ['KeyA', 'a'], ['BracketLeft', 'ü'], ['Minus', 'ß'], ['KeyM', 'µ'], ['KeyW', 'w']])}});`});
+        await scanning(page);
+        await page.key('F1');
+        await page.until('document.getElementById("help").open');
+        const keys = await page.value('[...document.querySelectorAll("#help dt")].map((one) => one.textContent).join("|")');
+        for (const words of ['A D Y X, Shift + drag', '|Ü ] ; \'|ß =|', '|N, Shift + N|', ', . P']) expect(keys.includes(words), `${words} in ${keys}`);
+        expect_equal(await page.value('document.getElementById("measure").title'), 'Two clicks, or arrow keys and Enter; C clears (Μ)', 'a tip');
+        expect(await page.value('document.getElementById("help-title").getBoundingClientRect().top >= 0 && document.getElementById("help").scrollTop === 0'), 'its heading is in view');
+        await page.close();
+    },
+    async events_are_said_in_the_language_in_use() {
+        const page = await browser.page();
+        await scanning(page, '?case=small&exercise=scan&lang=de');
+        const said = await page.value(`(() => {
+            const {scan} = sonoplay.app, {labels} = scan.description;
+            labels.push({name: 'kidney_left', english: 'left kidney', words: 'Kidney', side: 'left', number: ''});
+            const lines = ['Insertion 2', 'Needle out, was 31 mm deep', 'Reached: target 2', 'Seen: Zyste', 'Touched: left kidney', 'Left: a structure', 'Needle lost', 'Probe lost', 'Done: numbed', 'Complication'];
+            return lines.map((line) => scan.words_of_event(line)).join('|');
+        })()`);
+        expect(said.startsWith('Einstich 2|Nadel draußen, war 31 mm tief|Erreicht: Ziel 2|Gesehen: Zyste|Berührt: '), said);
+        expect(said.endsWith('|Getan: numbed|Komplikation'), said);
+        expect(!/kidney|structure|lost/i.test(said), said);
+        await page.close();
+    },
+    async without_its_script_the_page_says_why() {
+        const page = await browser.page();
+        const notice = 'document.getElementById("notice").innerText';
+        await page.open(`file://${site}/index.html`);
+        await page.until(`${notice}.includes("--single-file") && ${notice}.includes("Diese Seite ist nicht gestartet") && getComputedStyle(document.getElementById("notice")).visibility === "visible"`);
+        await page.open(url);
+        await page.until(`sonoplay.app.ready && ${notice} === ""`);
+        await page.close();
+    },
+    async results_fit_a_narrow_phone_in_both_languages() {
+        for (const lang of ['en', 'de']) {
+            const page = await browser.page(360, 640);
+            Object.assign(page, {mobile: true, ratio: 2});
+            await scanning(page, `?case=small&exercise=scan&lang=${lang}`);
+            await page.key('KeyB');
+            await page.until(`${seconds_attempt} > 5.2`);
+            await page.key('KeyB');
+            await page.until('!document.getElementById("after").hidden && sonoplay.app.settled === sonoplay.app.started');
+            await page.value(`sonoplay.app.show_checklist({items: [{name: 'a', title: 'Hautdesinfektion mit Einwirkzeit abgewartet', critical: true, ticked: false, time_s: 61, why: 'too_early'}], points: 1, max_points: 2, cut: 1, stray_acts: 0, stray_acts_at_most: 3, complications: []}, {})`);
+            const out = (table) => page.value(`(() => {
+                const cells = [...document.querySelectorAll('#${table} td')].filter((one) => one.textContent);
+                return cells.length ? cells.filter((one) => { const {left, right} = one.getBoundingClientRect(); return left < 0 || right > 360 || one.scrollWidth > one.clientWidth + 1; }).map((one) => one.textContent).join() : 'empty';
+            })()`);
+            for (const table of ['marks', 'checklist']) expect_equal(await out(table), '', `${lang}: ${table}`);
+            await page.click('after-cases');
+            await page.click('open-scores');
+            await page.until('document.querySelectorAll("#attempts tr").length === 1');
+            expect_equal(await out('attempts'), '', `${lang}: attempts`);
+            expect(await page.value('document.documentElement.scrollWidth <= innerWidth'), `${lang}: no sideways scrolling`);
+            await page.close();
+        }
     },
     async a_second_attempt_shows_the_trend_and_a_button_sets_the_gain() {
         const page = await browser.page();
@@ -315,8 +638,7 @@ await run_tests({
     },
     async every_control_has_a_name_and_words_have_contrast() {
         const page = await browser.page();
-        await scanning(page);
-        const faults = await page.value(`(() => {
+        const look = () => page.value(`(() => {
             const faults = [];
             const luminance = (colour) => {
                 const [r, g, b] = colour.match(/[\\d.]+/g).map(Number).map((c) => (c /= 255) <= 0.03928 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
@@ -341,11 +663,25 @@ await run_tests({
             sonoplay.app.scan.doppler.choose('off');
             sonoplay.app.scan.view3d.show_it(true);
             look('3-D view');
-            for (const name of ['start', 'after', 'scores']) { sonoplay.app.show(name); look(name); }
+            for (const name of ['start', 'after', 'scores']) {
+                sonoplay.app.show(name);
+                for (const disabled of [true, false]) {
+                    for (const e of document.querySelectorAll('#' + name + ' button, #' + name + ' select')) e.disabled = disabled;
+                    look(name);
+                    // A control that cannot be used is not what stands out.
+                    for (const e of document.querySelectorAll('button:disabled')) if (e.checkVisibility() && Math.abs(luminance(fill(e)) - luminance(fill(e.parentElement))) > 0.2) faults.push(name + ': disabled: ' + e.textContent);
+                }
+            }
             document.getElementById('help').showModal(); look('help');
+            document.getElementById('help').close();
+            sonoplay.app.show('scan');
             return faults;
         })()`);
-        expect_equal(faults.join('\n'), '', 'faults');
+        await scanning(page);
+        for (const scheme of ['dark', 'light']) {
+            await page.send('Emulation.setEmulatedMedia', {features: [{name: 'prefers-color-scheme', value: scheme}]});
+            expect_equal((await look()).join('\n'), '', `faults, ${scheme}`);
+        }
         await page.close();
     },
     async the_picture_takes_the_width_and_height_that_the_page_has() {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
-// Statements to a learning record store (runtime/web/page/results.js), in node: with a store that answers as those of
-// learning platforms do, or does not, and with a browser that keeps things or does not.
+// Attempts that a browser keeps, and statements to a learning record store (runtime/web/page/results.js), in node: with a
+// browser that keeps things or does not, and with a store that answers as those of learning platforms do, or does not.
 import {createServer} from 'node:http';
 import {webcrypto} from 'node:crypto';
 import {expect, expect_equal, run_tests} from './support.mjs';
@@ -12,32 +12,86 @@ let pages = 0;
 // The module anew, as a page that opens.
 const open_page = () => import(`../../../runtime/web/page/results.js?${++pages}`);
 
-// As much of IndexedDB as results.js uses; what it holds stays when a page opens anew.
-function kept_storage() {
-    const stores = new Map();
-    const answer = (result) => {
-        const asked = {};
-        setTimeout(() => { asked.result = result(); asked.onsuccess?.(); }, 0);
-        return asked;
-    };
-    const db = {
-        objectStoreNames: {contains: (name) => stores.has(name)},
-        createObjectStore: (name, {keyPath}) => stores.set(name, {keyPath, next: 1, rows: new Map()}),
-        transaction: () => ({objectStore: (name) => {
+// As much of IndexedDB as results.js uses; what it holds stays when a page opens anew. As in a browser, what a transaction
+// was asked for stays once it is complete. full(): the browser has no room: requests succeed, and the transaction is aborted.
+// blocked: an older page is open in another tab, until free() is called. version: of the newest page that was here.
+function kept_storage({full = () => false, blocked = false, version = 0} = {}) {
+    const stores = new Map(), storage = {stores, opened: 0};
+    const later = (what) => setTimeout(what, 0);
+    const make = (name, {keyPath}) => stores.set(name, {keyPath, next: 1, rows: new Map()});
+    const transaction = (db, names) => {
+        if (db.closed) throw new DOMException('closed', 'InvalidStateError');
+        const on = {error: null}, undo = new Map();
+        let waiting = 0;
+        const settle = () => later(() => {
+            if (waiting || on.ended) return;
+            on.ended = true;
+            if (undo.size && full()) {
+                for (const [of, rows] of undo) of.rows = rows;
+                on.error = new DOMException('full', 'QuotaExceededError');
+                on.onabort?.();
+            } else {
+                on.oncomplete?.();
+            }
+        });
+        const answer = (work) => {
+            const asked = {};
+            ++waiting;
+            later(() => {
+                --waiting;
+                try {
+                    asked.result = work();
+                    asked.onsuccess?.();
+                } catch (error) {
+                    asked.error = error;
+                    asked.onerror?.({preventDefault() {}});
+                }
+                settle();
+            });
+            return asked;
+        };
+        on.objectStore = (name) => {
+            if (![names].flat().includes(name)) throw new DOMException(name, 'NotFoundError');
             const of = stores.get(name);
+            const writes = (work) => answer(() => { if (!undo.has(of)) undo.set(of, new Map(of.rows)); return work(); });
+            const put = (row) => { const key = row[of.keyPath] ?? of.next++; of.rows.set(key, {...structuredClone(row), [of.keyPath]: key}); return key; };
             return {
-                add: (row) => answer(() => { of.rows.set(of.next, {...structuredClone(row), [of.keyPath]: of.next}); return of.next++; }),
-                getAll: () => answer(() => [...of.rows.values()]),
-                delete: (key) => answer(() => of.rows.delete(key)),
-                clear: () => answer(() => of.rows.clear()),
+                transaction: on,
+                add: (row) => writes(() => put(row)), put: (row) => writes(() => put(row)),
+                delete: (key) => writes(() => of.rows.delete(key)), clear: () => writes(() => of.rows.clear()),
+                get: (key) => answer(() => { if (of.rows.get(key) === 'unreadable') throw new DOMException('lost', 'DataError'); return of.rows.get(key); }),
+                getAll: () => answer(() => [...of.rows.values()]), getAllKeys: () => answer(() => [...of.rows.keys()]),
             };
-        }}),
+        };
+        return on;
     };
-    return {open: () => {
+    storage.make = make;
+    storage.open = (name, asked_version) => {
         const opening = {};
-        setTimeout(() => { opening.result = db; opening.onupgradeneeded?.(); opening.onsuccess?.(); }, 0);
+        const succeed = () => {
+            const db = {closed: false, close: () => { db.closed = true; }, objectStoreNames: {contains: (one) => stores.has(one)}, createObjectStore: make,
+                transaction: (names) => transaction(db, names)};
+            storage.db = opening.result = db;
+            ++storage.opened;
+            if (!asked_version || asked_version <= version) return later(() => opening.onsuccess?.());
+            version = asked_version;
+            opening.onupgradeneeded?.();
+            return later(() => opening.onsuccess?.());
+        };
+        later(() => {
+            if (asked_version < version) {
+                opening.error = new DOMException('newer', 'VersionError');
+                opening.onerror?.();
+            } else if (blocked) {
+                storage.free = succeed;
+                opening.onblocked?.();
+            } else {
+                succeed();
+            }
+        });
         return opening;
-    }};
+    };
+    return storage;
 }
 
 // answer(statements, request): the status that the store gives.
@@ -65,6 +119,7 @@ async function with_store(answer, use) {
 }
 
 const attempt = {started: '2026-01-31T12:00:00Z', trainee: 'Ada', case_name: 'demo', exercise: 'liver', title: 'Liver'};
+const attempt_of = (n) => ({...attempt, started_ms: n, passed: false, seed: 0, exam: false, score_text: '{"metrics":{"elapsed_time_s":9}}', recording: new Uint8Array([n])});
 const score = {passed: true, metrics: {targets_hit: 1}, pass_marks: [{passed: true}, {passed: false}]};
 const three = (page, launch = null) => [page.statement('attempted', attempt, null, launch),
     page.statement('completed', attempt, score, launch), page.statement('scored', attempt, score, launch)];
@@ -108,6 +163,84 @@ await run_tests({
                 expect_equal(store.requests.map(({count}) => count).join(), '3,6,9,9', 'each try once');
             });
         }
+    },
+    async an_attempt_is_kept_once_the_transaction_is_complete() {
+        let full = false;
+        globalThis.indexedDB = kept_storage({full: () => full});
+        let page = await open_page();
+        expect_equal(await page.keep_attempt(attempt_of(1)), true, 'kept');
+        full = true;
+        expect_equal(await page.keep_attempt(attempt_of(2)), false, 'no room');
+        const said = (all) => all.map(({started_ms, in_page}) => `${started_ms}${in_page ? ' here' : ''}`).join();
+        const all = await page.kept_attempts();
+        expect_equal(said(all), '1,2 here', 'both are in this page');
+        expect_equal([...await page.recording_of(all[0]), ...await page.recording_of(all[1])].join(), '1,2', 'recordings');
+        expect_equal(globalThis.indexedDB.stores.get('recordings').rows.size, 1, 'no half of an attempt');
+        // Statements wait in the page where there is no room.
+        await with_store(() => 503, async (store, endpoint) => {
+            expect_equal((await page.send_statements(endpoint, three(page))).waiting, 3, 'waiting');
+        });
+        let failed = false;
+        await page.remove_attempts().catch(() => { failed = true; });
+        expect(failed, 'a removal that did not happen is said');
+        page = await open_page();
+        expect_equal(said(await page.kept_attempts()), '1', 'the next visit has the one that was kept');
+    },
+    async attempts_of_older_pages_are_read_and_their_recordings_put_apart() {
+        const storage = globalThis.indexedDB = kept_storage({version: 2});
+        storage.make('attempts', {keyPath: 'id'});
+        storage.make('statements', {keyPath: 'key'});
+        const {rows} = storage.stores.get('attempts');
+        const {started_ms, seed, exam, trainee, ...oldest} = attempt_of(1);
+        rows.set(7, {...oldest, id: 7}).set(8, {...attempt_of(8), id: 8});
+        const page = await open_page(), all = await page.kept_attempts();
+        expect_equal(all.map((one) => `${one.id} ${one.trainee} ${one.started_ms} ${one.recording}`).join(), `7  ${Date.parse(oldest.started)} undefined,8 Ada 8 undefined`, 'read');
+        expect_equal([...await page.recording_of(all[0])].join(), '1', 'its recording');
+        for (let n = 0; n < 100 && storage.stores.get('recordings').rows.size < 2; ++n) await new Promise((done) => setTimeout(done, 5));
+        expect_equal([...storage.stores.get('attempts').rows.values()].map((one) => one.recording).join(), ',', 'none is left within');
+        expect_equal([...await page.recording_of(all[1])].join(), '8', 'its recording, apart');
+        await page.remove_attempt(7);
+        expect_equal(`${[...storage.stores.get('attempts').rows.keys()]} ${[...storage.stores.get('recordings').rows.keys()]}`, '8 8', 'one is removed');
+    },
+    async a_damaged_record_holds_up_none_of_the_others() {
+        const storage = globalThis.indexedDB = kept_storage(), page = await open_page();
+        await page.keep_attempt(attempt_of(1));
+        const {rows} = storage.stores.get('attempts'), {score_text, started, ...rest} = attempt_of(2);
+        rows.set(2, {...rest, started}).set(3, {...rest, score_text}).set(4, {...rest, started, score_text: '{"metr'}).set(5, {...rest, started: 5, score_text});
+        rows.set(6, null).set(7, 'unreadable').set(8, {...rest, started: 'yesterday', score_text}).set(9, {...attempt_of(9), id: 9});
+        const all = await page.kept_attempts();
+        expect_equal(all.map(({id, damaged}) => `${id}${damaged ? 'x' : ''}`).join(), '1,2x,3x,4x,5x,6x,7x,8x,9', 'each for itself');
+        for (const {id, damaged} of all) if (damaged) await page.remove_attempt(id);
+        expect_equal((await page.kept_attempts()).map(({id}) => id).join(), '1,9', 'they can be removed');
+    },
+    async an_older_page_in_another_tab_holds_up_nothing() {
+        const storage = globalThis.indexedDB = kept_storage({blocked: true}), page = await open_page();
+        let late = false;
+        page.when_store_opens(() => { late = true; });
+        expect_equal(await page.kept_attempts(), null, 'nothing is kept');
+        expect_equal(page.store_waits(), true, 'and it is known why');
+        expect_equal(await page.keep_attempt(attempt_of(1)), false, 'in this page alone');
+        storage.free();
+        for (let n = 0; n < 100 && !late; ++n) await new Promise((done) => setTimeout(done, 5));
+        expect(late && !page.store_waits(), 'open, once that tab is closed');
+        expect_equal((await page.kept_attempts()).map(({in_page}) => Boolean(in_page)).join(), 'false', 'kept now');
+    },
+    async a_page_lets_go_of_the_store_for_a_newer_one_and_works_with_what_that_left() {
+        const storage = globalThis.indexedDB = kept_storage(), page = await open_page();
+        await page.keep_attempt(attempt_of(1));
+        const {db} = storage;
+        db.onversionchange();
+        expect(db.closed, 'closed');
+        expect_equal((await page.kept_attempts()).length, 1, 'opened again');
+        // The browser closes it, where the site's data are cleared.
+        storage.db.closed = true;
+        storage.stores.get('attempts').rows.clear();
+        expect_equal((await page.kept_attempts()).length, 0, 'cleared');
+        expect_equal(await page.keep_attempt(attempt_of(2)), true, 'kept again');
+        const newer = globalThis.indexedDB = kept_storage({version: 9});
+        newer.make('attempts', {keyPath: 'id'});
+        newer.make('recordings', {keyPath: 'id'});
+        expect_equal(await (await open_page()).keep_attempt(attempt_of(3)), true, 'a newer store is used as it is');
     },
     async hundreds_go_in_pieces() {
         globalThis.indexedDB = kept_storage();

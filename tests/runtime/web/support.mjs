@@ -94,10 +94,14 @@ export class Browser {
 
 export class Page {
     constructor(browser, session, target, width, height) {
-        Object.assign(this, {browser, session, target, width, height, requests: [], errors: []});
+        Object.assign(this, {browser, session, target, width, height, requests: [], errors: [], dialogs: []});
         browser.listeners.add((message) => {
             if (message.sessionId !== session) return;
             if (message.method === 'Network.requestWillBeSent') this.requests.push(message.params.request.url);
+            if (message.method === 'Page.javascriptDialogOpening') {  // "Leave the page?"
+                this.dialogs.push(message.params.type);
+                this.send('Page.handleJavaScriptDialog', {accept: true}).catch(() => {});
+            }
             if (message.method === 'Runtime.exceptionThrown') this.errors.push(message.params.exceptionDetails.exception?.description);
             if (message.method === 'Log.entryAdded' && message.params.entry.level === 'error') this.errors.push(message.params.entry.text);
         });
