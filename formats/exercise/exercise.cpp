@@ -394,7 +394,13 @@ Exercise read_exercise(const TomlTable& root) {
 
 Result<Exercise> parse_exercise(std::string_view text, const std::string& where) {
     SONOCASE_TRY(const auto root, TomlTable::parse(text, where));
+    std::string frame = "mannequin";
+    root.text("frame", frame, {"ct", "mannequin"});
     Exercise exercise = read_exercise(root);
+    if (frame == "ct")
+        return Error{"the positions are those of the CT", where,
+                     "expected frame = \"mannequin\", or a case that is built with this file: "
+                     "building moves them"};
     if (root.fault()) return *root.fault();
     return exercise;
 }

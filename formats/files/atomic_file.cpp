@@ -208,6 +208,22 @@ Status write_file(const std::string& path, std::string_view text) {
                       std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
 }
 
+Status expect_writable(const std::string& path) {
+    std::error_code code;
+    if (fs::is_directory(path, code)) return Error{"is a folder", path, "give the name of a file"};
+    fs::path at = path;
+    if (!fs::exists(at, code) || fs::is_regular_file(at, code)) {  // a new file takes its place
+        do at = at.has_parent_path() && at != at.parent_path() ? at.parent_path() : fs::path(".");
+        while (!fs::exists(at, code));
+        if (!fs::is_directory(at, code))
+            return Error{"is no folder", at.string(), "give a path through folders"};
+    }
+    const int rights = fs::is_directory(at, code) ? W_OK | X_OK : W_OK;
+    if (::access(at.c_str(), rights) == 0) return Done{};
+    return system_error("cannot write here: {}", errno, at.string(),
+                        "give a place that you may write to");
+}
+
 OutputFile::OutputFile(std::string path)
     : path_(std::move(path)), temporary_(temporary_name(path_)) {
     std::error_code code;  // if the folder cannot be made, opening the file fails

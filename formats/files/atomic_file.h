@@ -34,6 +34,10 @@ Status expect_regular_file(const std::string& path,
 Status write_file(const std::string& path, std::span<const std::uint8_t> bytes);
 Status write_file(const std::string& path, std::string_view text);
 
+// An error where write_file would fail for want of rights, or where a folder has that name: to be
+// asked before long work. Writes nothing.
+Status expect_writable(const std::string& path);
+
 // For libraries that write files themselves: they write temporary(), which is in the same folder
 // and has the same ending, and commit() renames it. Without commit() the temporary is removed.
 class OutputFile {

@@ -73,7 +73,13 @@ Error toml_fault(std::string_view description, const std::string& where) {
     if (const std::string twice = "cannot redefine existing "; what.starts_with(twice))
         return {"the " + what.substr(twice.size()) + " is given twice", where,
                 "remove one of the two"};
-    return {"not valid TOML (" + what + in + ")", where, "correct this line"};
+    std::string expected = "correct this line";
+    const auto says = [&](const char* word) { return (what + in).find(word) != std::string::npos; };
+    if (says("utf-8") || says("u0000"))
+        expected = "save the file as UTF-8";
+    else if (says("scalar") || says("escape"))
+        expected = "in a path write / for \\, or put it in single quotes";
+    return {"not valid TOML (" + what + in + ")", where, expected};
 }
 
 Result<TomlTable> TomlTable::parse(std::string_view text, const std::string& where) {

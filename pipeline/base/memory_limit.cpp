@@ -2,6 +2,7 @@
 
 #include "pipeline/base/memory_limit.h"
 
+#include <sys/resource.h>
 #include <unistd.h>
 
 #ifdef __GLIBC__
@@ -35,6 +36,12 @@ double machine_memory_mb() {
         double bytes = 0;
         if (file >> bytes) limit = std::min(limit, bytes / 1e6);
         path.resize(path == "/" ? 0 : path.rfind('/'));
+    }
+    for (const int of : {RLIMIT_AS, RLIMIT_DATA}) {  // ulimit -v, -d
+        rlimit allowed{};
+        if (getrlimit(static_cast<decltype(RLIMIT_AS)>(of), &allowed) == 0 &&
+            allowed.rlim_cur != RLIM_INFINITY)
+            limit = std::min(limit, static_cast<double>(allowed.rlim_cur) / 1e6);
     }
     return limit;
 }

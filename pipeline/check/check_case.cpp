@@ -6,8 +6,10 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <string_view>
 
 #include "formats/exercise/exercise.h"
+#include "formats/exercise/metric_table.h"
 #include "formats/text/excerpt.h"
 #include "formats/text/json_reader.h"
 #include "formats/text/nearest_name.h"
@@ -435,6 +437,12 @@ class Exercises {
                                       "move it"});
             return;
         }
+        if (labels_.find(target.inside) >= 0 && label != labels_.find(target.inside))
+            result_.faults.push_back({"target-elsewhere",
+                                      exercise.name + ": target '" + target.name + "' lies in '" +
+                                          labels_.name(label) + "' and not in '" + target.inside +
+                                          "'",
+                                      "move it, or say inside = \"" + labels_.name(label) + "\""});
         AimOptions options = aim_options(exercise);
         options.windows = 3;
         const AimResult aimed = aim(
@@ -471,6 +479,11 @@ class Exercises {
             row.played = true;
             row.missed = play_as_expert(bundle_, exercise, windows_).missed;
         }
+        if (exercise.targets.empty())
+            for (const Exercise::PassMark& mark : exercise.pass_marks)
+                if (const MetricInfo* metric = find_metric(mark.metric);
+                    metric != nullptr && std::string_view(metric->group) == "targets")
+                    row.missed.push_back(mark.metric + " (there is no target)");
         if (!row.missed.empty()) {
             std::string marks;
             for (const std::string& mark : row.missed) marks += (marks.empty() ? "" : ", ") + mark;

@@ -14,9 +14,10 @@
 //                      tissue than it has
 //     texture-missing  a tissue names a solid texture that the bundle lacks
 //     target-in-bone   a target that no needle can enter
+//     target-elsewhere a target that lies in another label than its `inside`
 //     unreachable      no window on the skin sees the target, or none lets a needle pass
 //     not-passable     a scripted expert plays the exercise through the first windows and misses a
-//                      pass mark
+//                      pass mark, or a mark is of targets and there is none
 //     sweep-in-air     a scripted sweep whose probe or needle is not where the body is
 //     not-valid        what `validate` refuses
 #pragma once

@@ -209,24 +209,96 @@ Result<std::string> other_hosts(const PublishOptions& options) {
 }
 
 // warnings: of covers that could not be drawn, whose cases keep their bundle's slices.
+// A case that a site's list names.
+struct ListedCase {
+    std::string name, file;
+};
+// Those of the site that is in a folder. Error: the folder has a page that is no site of ours.
+Result<std::vector<ListedCase>> listed_cases(const std::string& site) {
+    std::error_code failed;
+    const std::string path = site + "/cases.json";
+    if (!fs::exists(path, failed)) {
+        if (fs::exists(site + "/index.html", failed))
+            return Error{"this folder has another page in it", site,
+                         "give a new folder, or one that publish wrote"};
+        return std::vector<ListedCase>{};
+    }
+    SONOCASE_TRY(const auto text, read_text_file(path));
+    detail::Json root;
+    detail::JsonFault fault;
+    const Error other{"is no list of a site", path, "give a new folder, or one that publish wrote"};
+    const auto words = [](const detail::Json& of, const char* key) {
+        return of.contains(key) && of[key].is_string() ? of[key].get<std::string>() : "";
+    };
+    if (!detail::parse_json(text, root, fault) || !root.is_object() ||
+        words(root, "format") != "sonocase site" || !root.contains("cases") ||
+        !root["cases"].is_array())
+        return other;
+    std::vector<ListedCase> out;
+    for (const detail::Json& one : root["cases"]) {
+        if (!one.is_object()) return other;
+        const std::string file = words(one, "file");
+        if (file.empty() || file.find('/') != file.npos) return other;
+        out.push_back({words(one, "name"), file});
+    }
+    return out;
+}
+
+// What publish does to a site's list: cases that stay are read from the site again.
+struct SiteChange {
+    std::vector<ListedCase> stays;
+    std::string note;  // what is on the page no more; empty: nothing
+};
+SiteChange change_of(const std::vector<ListedCase>& listed,
+                     const std::vector<ReadCase>& given,
+                     bool add) {
+    SiteChange change;
+    std::string gone, files;
+    for (const ListedCase& one : listed) {
+        const auto now = std::find_if(given.begin(), given.end(),
+                                      [&](const ReadCase& c) { return c.site.name == one.name; });
+        if (now == given.end() && add) {
+            change.stays.push_back(one);
+            continue;
+        }
+        if (now == given.end()) gone += (gone.empty() ? "" : ", ") + one.name;
+        if (now == given.end() || now->site.file != one.file)
+            files += (files.empty() ? "" : ", ") + one.file;
+    }
+    if (!gone.empty())
+        change.note = "No longer on the page: " + gone + " (--add keeps what is there). ";
+    if (!files.empty())
+        change.note +=
+            "No list names these files any more; remove them once nobody plays them: " + files +
+            ".";
+    return change;
+}
+
+Result<ReadCase> read_case(const std::string& path,
+                           const std::string& name,
+                           std::vector<std::string>& warnings) {
+    SONOCASE_TRY(auto bytes, read_large_file(path));
+    SONOCASE_TRY(auto read, site_case(bytes, name));
+    // As the window draws it: the start of the first exercise.
+    auto cover = ultrasound_png(path, {});
+    if (cover) {
+        read.site.preview = std::move(*cover);
+    } else {
+        warnings.push_back(
+            "The card of " + read.site.name +
+            " shows slices of its labels instead of the ultrasound: " + cover.error().message());
+    }
+    return read;
+}
+
 Result<std::vector<ReadCase>> read_cases(const std::vector<std::string>& paths,
                                          std::vector<std::string>& warnings) {
     std::vector<ReadCase> out;
     std::set<std::string> names;
     for (const std::string& path : paths) {
-        SONOCASE_TRY(auto bytes, read_large_file(path));
-        SONOCASE_TRY(auto read, site_case(bytes, path));
+        SONOCASE_TRY(auto read, read_case(path, path, warnings));
         if (!names.insert(read.site.name).second) {
             return Error{"two cases are named " + read.site.name, path, "rename one of the files"};
-        }
-        // As the window draws it: the start of the first exercise.
-        auto cover = ultrasound_png(path, {});
-        if (cover) {
-            read.site.preview = std::move(*cover);
-        } else {
-            warnings.push_back("The card of " + read.site.name +
-                               " shows slices of its labels instead of the ultrasound: " +
-                               cover.error().message());
         }
         out.push_back(std::move(read));
     }
@@ -432,8 +504,15 @@ Result<Published> publish(const std::vector<std::string>& cases,
         program = std::move(found);
     }
     Published out;
-    SONOCASE_TRY(const auto read, read_cases(cases, out.warnings));
+    SONOCASE_TRY(auto read, read_cases(cases, out.warnings));
     if (options.single_file) return publish_page(read, program, site, options);
+    SONOCASE_TRY(const auto listed, listed_cases(site));
+    const SiteChange change = change_of(listed, read, options.add);
+    for (const ListedCase& one : change.stays) {
+        SONOCASE_TRY(auto kept, read_case(site + "/" + one.file, one.name, out.warnings));
+        read.push_back(std::move(kept));
+    }
+    if (!change.note.empty()) out.warnings.push_back(change.note);
     std::optional<SiteCourse> course;
     if (!options.course.empty()) {
         SONOCASE_TRY(course, read_course(options.course, read));

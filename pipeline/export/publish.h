@@ -75,6 +75,7 @@ struct PublishOptions {
     std::string xapi_key;
     std::string poses;         // origin of a pose server, ws://HOST:PORT; empty: none
     bool single_file = false;  // one .html with exactly one case
+    bool add = false;          // the cases that the site has already stay on it
     // A course (formats/exercise/course.h) that the site shows; all its cases have to be given.
     std::string course;
     std::vector<std::string> packages;  // of package_names(), written beside the site
@@ -89,8 +90,8 @@ struct Published {
 // file. site: a folder, or the .html of --single-file. Files are renamed into place one by one, the
 // list of cases last, so that a site in use never names a file that is not there yet. Errors: a
 // bundle that cannot be read, two of the same name, no program, an address that is not https, a
-// file that cannot be written; a course that cannot be read, or that needs a case, an exercise or
-// an expert which is not among the cases given.
+// folder with another page in it, a file that cannot be written; a course that cannot be read, or
+// that needs a case, an exercise or an expert which is not among the cases given.
 Result<Published> publish(const std::vector<std::string>& cases,
                           const std::string& site,
                           const PublishOptions& options = {});

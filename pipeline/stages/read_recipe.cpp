@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -244,6 +245,7 @@ std::vector<EmbeddedExercise> chosen(const std::vector<EmbeddedExercise>& all,
 }
 
 Status check_exercises(const Recipe& recipe) {
+    std::map<std::string, std::string> files;  // by the exercise's own name
     for (const EmbeddedExercise& exercise : recipe.exercises) {
         const std::string where = (fs::path(recipe.folder) / (exercise.name + ".toml")).string();
         SONOCASE_TRY(auto framed, strip_frame(exercise.toml, where));
@@ -253,7 +255,12 @@ Status check_exercises(const Recipe& recipe) {
             for (const PathologyRequest& request : recipe.settings.of<PathologyOptions>().requests)
                 names.push_back({request.name, {}, 5, request.target});
         SONOCASE_TRY(auto aimed, targets_from_key(framed.toml, where, names));
-        SONOCASE_TRY_DONE(parse_exercise(aimed, where));
+        SONOCASE_TRY(const auto parsed, parse_exercise(aimed, where));
+        const auto [first, is_new] = files.insert({parsed.name, where});
+        if (!is_new)
+            return Error{
+                "the exercise is named '" + parsed.name + "', as is that of " + first->second,
+                where, "give each a name of its own"};
     }
     return Done{};
 }

@@ -4,6 +4,7 @@
 #include <csignal>
 #include <cstdio>
 #include <functional>
+#include <new>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "formats/base/build_facts.h"
 #include "formats/base/stage_report.h"
 #include "formats/text/nearest_name.h"
+#include "pipeline/base/memory_limit.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/verbs/stage_verb.h"
 #include "pipeline/verbs/verb_common.h"
@@ -142,6 +144,13 @@ int main(int argc, char** argv) {
     std::signal(SIGXFSZ, SIG_IGN);
     try {
         return sonocase::pipeline::run(argc, argv);
+    } catch (const std::bad_alloc&) {
+        char text[80];
+        std::snprintf(text, sizeof text, "out of memory: %.0f MB are allowed",
+                      sonocase::pipeline::memory_limit_mb());
+        return sonocase::pipeline::fail(
+            argc > 1 ? argv[1] : "",
+            {text, "", "a machine or a limit with more, larger voxels or --preset draft"});
     } catch (const std::exception& exception) {
         // The stages catch what their libraries throw; what is left is exhaustion of memory or
         // disk.

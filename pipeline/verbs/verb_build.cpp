@@ -310,6 +310,11 @@ int build_one(const BuildOptions& options) {
     auto recipe = options.recipe.empty() ? embedded_recipe(options.overrides)
                                          : load_recipe(options.recipe, options.overrides);
     if (!recipe) return fail("build", recipe.error());
+    if (options.until.empty()) {
+        const auto s =
+            expect_writable(options.out.empty() ? recipe->name + ".sonocase" : options.out);
+        if (!s) return fail("build", s.error());
+    }
     const bool say = !options.common.quiet || options.target.tolerance_mm > 0 ||
                      options.target.time_budget_s > 0 || !options.common.report_path.empty();
     const double speed = say ? machine_speed(options.common.threads) : 1;
@@ -387,6 +392,7 @@ int build_several(const BuildOptions& options) {
                                          : load_recipe(options.recipe, options.overrides);
     if (!recipe) return fail("build", recipe.error());
     const std::string out = options.out.empty() ? recipe->name + ".sonocase" : options.out;
+    if (const Status s = expect_writable(out); !s) return fail("build", s.error());
     BuildOptions one = options;
     if (const Status s = open_own_cache(one, out); !s) return fail("build", s.error());
     int worst = kDone;
@@ -447,13 +453,13 @@ int verb_build(int argc, char** argv) {
         ->type_name("DIR");
     app.add_option("--cache-limit-mb", options.cache_limit_mb,
                    "Limit of the cache folder's size; 0 means none")
-        ->check(CLI::NonNegativeNumber)
+        ->check(CLI::Range(0.0, 1e9))
         ->type_name("MB");
     app.add_option(
            "--memory-mb", options.memory_mb,
            "Work within this where that only takes longer, and refuse a case that needs more;"
            " 0 means what this machine has")
-        ->check(CLI::NonNegativeNumber)
+        ->check(CLI::Range(0.0, 1e9))
         ->type_name("MB");
     app.add_option("--preview", options.preview, "Write the case's picture as well")
         ->type_name("FILE.png");
@@ -466,11 +472,11 @@ int verb_build(int argc, char** argv) {
         ->type_name("KEY");
     app.add_option("--tolerance-mm", options.target.tolerance_mm,
                    "Take the cheapest settings with which this case's own error is within X")
-        ->check(CLI::PositiveNumber)
+        ->check(CLI::Range(1e-3, 1e9))
         ->type_name("X");
     app.add_option("--time-budget-s", options.target.time_budget_s,
                    "Take the best settings that this machine manages in T seconds")
-        ->check(CLI::PositiveNumber)
+        ->check(CLI::Range(1e-3, 1e9))
         ->type_name("T");
     app.add_flag("--list-options", options.list_options,
                  "Print every option key with default and range");

@@ -81,6 +81,7 @@ int verb_publish(int argc, char** argv) {
     app.add_option("-o,--output", site, "Folder of the site, or the page of --single-file")
         ->type_name("SITE")
         ->required();
+    app.add_flag("--add", options.add, "Keep the cases that the site has already");
     app.add_flag("--single-file", options.single_file,
                  "One .html with one case inside, which opens from disk");
     app.add_option("--course", options.course,

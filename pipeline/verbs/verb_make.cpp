@@ -54,6 +54,7 @@ int verb_make(int argc, char** argv) {
         ->allow_extra_args(false);
     app.add_flag("--accept-faults", options.accept_faults,
                  "Go on, and publish, where the check finds faults");
+    options.publish.add = true;  // a site grows case by case
     app.add_option("--program", options.publish.program_folder,
                    "Folder with the player for browsers, as scripts/web builds it")
         ->type_name("DIR");

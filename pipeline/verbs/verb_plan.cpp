@@ -80,11 +80,11 @@ int verb_cache(int argc, char** argv) {
         ->check(CLI::ExistingDirectory);
     app.add_option("--limit-mb", limit_mb,
                    "Remove what has not been used for longest; 0 means no limit")
-        ->check(CLI::NonNegativeNumber)
+        ->check(CLI::Range(0.0, 1e9))
         ->type_name("MB");
     app.add_option("--older-than", longest_days,
                    "Remove what has not been used for so many days; 0 means any time")
-        ->check(CLI::NonNegativeNumber)
+        ->check(CLI::Range(0.0, 1e9))
         ->type_name("DAYS");
     app.add_flag("--verify", verify, "Read every entry and remove the damaged ones");
     if (const auto status = parse_command_line(app, argc, argv)) return *status;

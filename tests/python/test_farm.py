@@ -2,6 +2,7 @@
 """Data sets rendered by the farm, on this machine: the same bytes, and what fails is said."""
 
 import json
+import os
 import pathlib
 import shutil
 import subprocess
@@ -60,17 +61,22 @@ def killing_profile(tmp_path):
     return profile
 
 
-@needs_snakemake
-def test_each_try_of_a_stage_hands_more_memory_over(killing_profile, tmp_path):
+@pytest.fixture
+def stub(tmp_path):
+    """Stands for sonocase: its plan, one stage's report, and a check without faults. While a file `hold` is there, a build
+    says so in a pipe `begun` and then waits for a signal."""
     stage = {"stage": "pack", "key": "0123456789abcdef", "needs": [], "memory_mb": 240, "threads": 2, "seconds": 1, "why": "new"}
     plan = {"arguments": [], "cases": [{"name": "case", "recipe": "case", "done": False, "stages": [stage]}]}
-    stub = tmp_path / "sonocase"  # stands for sonocase: its plan, one stage's report, and a check without faults
+    stub = tmp_path / "sonocase"
     stub.write_text(f"""#!{sys.executable}
-import pathlib, sys
+import pathlib, signal, sys
 words = sys.argv[1:]
 if words[0] == "plan":
     pathlib.Path(words[words.index("-o") + 1], "plan.json").write_text({json.dumps(plan)!r})
 elif words[0] == "build":
+    if pathlib.Path({str(tmp_path / "hold")!r}).exists():
+        pathlib.Path({str(tmp_path / "begun")!r}).write_text("begun")
+        signal.pause()
     report = pathlib.Path(words[words.index("--report") + 1])
     report.write_text('{{"digest": "d", "stages": [], "warnings": [], "peak_mb": 1}}')
     pathlib.Path(words[words.index("-o") + 1]).touch()
@@ -78,8 +84,30 @@ elif words[0] == "check":
     print('{{"faults": [], "remarks": []}}')
 """)
     stub.chmod(0o755)
+    (tmp_path / "farm" / "cases").mkdir(parents=True)
+    return stub
+
+
+@needs_snakemake
+def test_who_stops_the_driver_stops_the_run_and_has_the_page(stub, tmp_path):
     folder = tmp_path / "farm"
-    (folder / "cases").mkdir(parents=True)
+    (tmp_path / "hold").touch()
+    os.mkfifo(tmp_path / "begun")
+    command = [FARM / "build-cases", "--sonocase", stub, "-o", folder, "case"]
+    driver = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    assert (tmp_path / "begun").read_text() == "begun"
+    driver.terminate()
+    said = driver.communicate()[1]
+    assert driver.returncode == 1 and "start it again" in said
+    assert (folder / "index.html").exists()
+    (tmp_path / "hold").unlink()
+    done = subprocess.run(command, capture_output=True, text=True)  # at once: nothing holds the lock
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@needs_snakemake
+def test_each_try_of_a_stage_hands_more_memory_over(killing_profile, stub, tmp_path):
+    folder = tmp_path / "farm"
     done = subprocess.run([FARM / "build-cases", "--sonocase", stub, "--profile", killing_profile, "-o", folder, "case"],
                           capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr + (folder / "logs" / "snakemake.log").read_text()

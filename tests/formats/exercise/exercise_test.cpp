@@ -106,6 +106,10 @@ TEST(Exercise, ReadsEveryKey) {
 }
 
 TEST(Exercise, ANameIsEnough) {
+    EXPECT_TRUE(parse_exercise("name = \"x\"\nframe = \"mannequin\"\n", "e.toml"));
+    const auto ct = parse_exercise("name = \"x\"\nframe = \"ct\"\n", "e.toml");
+    ASSERT_FALSE(ct);
+    EXPECT_NE(ct.error().message().text().find("building moves them"), std::string::npos);
     const auto e = parse_exercise("name = \"x\"\neffects = \"all\"\n", "e.toml");
     ASSERT_TRUE(e) << e.error().message();
     EXPECT_EQ(e->title, "x");

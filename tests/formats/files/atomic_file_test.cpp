@@ -77,6 +77,19 @@ TEST(AtomicFile, AFolderThatCannotBeMadeIsToldWithTheReason) {
     EXPECT_EQ(folder.names().size(), 1u);
 }
 
+TEST(AtomicFile, WhatCannotBeWrittenIsKnownBeforeTheWork) {
+    const TemporaryFolder folder;
+    EXPECT_TRUE(expect_writable(folder / "new/folder/a"));
+    EXPECT_TRUE(expect_writable("/dev/stdout"));
+    ASSERT_TRUE(write_file(folder / "file", std::string_view("x")));
+    EXPECT_TRUE(expect_writable(folder / "file"));
+    for (const std::string& path : {folder.path(), folder / "file/a"}) {
+        EXPECT_FALSE(expect_writable(path)) << path;
+        EXPECT_FALSE(write_file(path, std::string_view("x"))) << path;
+    }
+    EXPECT_EQ(folder.names().size(), 1u);
+}
+
 TEST(AtomicFile, MakesMissingFoldersAndAppendsToPipes) {
     const TemporaryFolder folder;
     ASSERT_TRUE(write_file(folder / "some/new/folder/a", std::string_view("x")));

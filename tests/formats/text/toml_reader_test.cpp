@@ -215,5 +215,21 @@ TEST(TomlReader, TextThatIsNotTomlNamesItsLine) {
     EXPECT_EQ(root.error().where, "a.toml:2");
 }
 
+TEST(TomlReader, AnotherEncodingOrAWindowsPathIsToldWithItsCure) {
+    using namespace std::string_literals;
+    for (const std::string& text :
+         {"\xFF\xFE"s + "n\0a\0m\0e\0"s, "name = \"Caf\xE9\"\n"s, "n\0a\0m\0e\0 \0=\0"s}) {
+        const auto root = TomlTable::parse(text, "a.toml");
+        ASSERT_FALSE(root);
+        EXPECT_EQ(root.error().expected, "save the file as UTF-8") << root.error().what;
+    }
+    for (const char* text : {"ct = \"C:\\Users\\a\"\n", "ct = \"D:\\data\"\n"}) {
+        const auto root = TomlTable::parse(text, "a.toml");
+        ASSERT_FALSE(root);
+        EXPECT_NE(root.error().expected.find("single quotes"), std::string::npos)
+            << root.error().what;
+    }
+}
+
 }  // namespace
 }  // namespace sonocase

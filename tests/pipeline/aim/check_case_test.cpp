@@ -73,6 +73,25 @@ TEST(CheckCase, TargetInBone) {
         names(with_exercise("centre = [60, 20, 330]", "centre = [0, -62, 200]"), "target-in-bone"));
 }
 
+TEST(CheckCase, TargetElsewhere) {
+    // Where it is, but meant for another organ.
+    const CheckResult result =
+        check_case(with_exercise("inside = \"liver\"", "inside = \"kidney_left\""));
+    ASSERT_EQ(result.faults.size(), 1u);
+    EXPECT_EQ(result.faults[0].name, "target-elsewhere");
+    EXPECT_NE(result.faults[0].what.find("not in 'kidney_left'"), std::string::npos);
+}
+
+TEST(CheckCase, AMarkOfTargetsWithoutATargetCannotBePassed) {
+    CaseBundle bundle = plain_case();
+    std::string& toml = bundle.exercises[0].toml;
+    const std::size_t from = toml.find("[[targets]]"), to = toml.find("\n[", from + 1);
+    toml.erase(from, to == std::string::npos ? to : to - from);
+    EXPECT_FALSE(names(bundle, "not-passable"));
+    toml += "\n[[pass_marks]]\nmetric = \"final_tip_to_target_mm\"\nat_most = 3\n";
+    EXPECT_TRUE(names(bundle, "not-passable"));
+}
+
 TEST(CheckCase, Unreachable) {
     CaseBundle bundle = plain_case();
     repaint(bundle, [](Point3 p, int label) {  // a shell of bone round the target

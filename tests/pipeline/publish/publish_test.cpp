@@ -91,6 +91,40 @@ TEST_F(Publish, the_same_cases_give_the_same_site) {
     EXPECT_EQ(text_of(site("/cases.json")), first);
 }
 
+TEST_F(Publish, a_site_grows_by_add_and_says_what_leaves_it) {
+    ASSERT_TRUE(write_file(case_path("second"), std::span<const std::uint8_t>(bytes_)));
+    const auto first = publish({case_path("round body")}, site(), options_);
+    ASSERT_TRUE(first);
+    options_.add = true;
+    const auto added = publish({case_path("second")}, site(), options_);
+    ASSERT_TRUE(added) << added.error().message();
+    for (const std::string& warning : added->warnings)
+        EXPECT_EQ(warning.find("No longer"), std::string::npos) << warning;
+    std::string list = text_of(site("/cases.json"));
+    EXPECT_NE(list.find("\"name\":\"second\""), std::string::npos);
+    EXPECT_NE(list.find("\"name\":\"round-body\""), std::string::npos);
+    ASSERT_TRUE(publish({case_path("second")}, site(), options_));
+    EXPECT_EQ(text_of(site("/cases.json")), list);  // the same again
+    options_.add = false;
+    const auto alone = publish({case_path("second")}, site(), options_);
+    ASSERT_TRUE(alone);
+    ASSERT_FALSE(alone->warnings.empty());
+    EXPECT_NE(alone->warnings.back().find("No longer on the page: round-body"), std::string::npos);
+    EXPECT_EQ(text_of(site("/cases.json")).find("round-body"), std::string::npos);
+}
+
+TEST_F(Publish, another_page_is_not_overwritten) {
+    for (const char* list : {"", "{\"format\": 3}", "[]", "{\"format\": \"sonocase site\"}"}) {
+        TemporaryFolder other;
+        ASSERT_TRUE(write_file(other / "index.html", std::string_view("mine")));
+        if (*list != 0) {
+            ASSERT_TRUE(write_file(other / "cases.json", std::string_view(list)));
+        }
+        EXPECT_FALSE(publish({case_path("round body")}, other.path(), options_)) << list;
+        EXPECT_EQ(text_of(other / "index.html"), "mine");
+    }
+}
+
 TEST_F(Publish, a_record_store_is_allowed_by_the_policy_and_no_other_host) {
     options_.xapi = "https://store.example.org/xapi";
     ASSERT_TRUE(publish({case_path("round body")}, site(), options_));

@@ -272,6 +272,16 @@ TEST(Recipe, ReadsAFineRegion) {
     EXPECT_NE(missing.error().message().find("node"), std::string::npos);
 }
 
+TEST(Recipe, TwoExercisesOfOneNameAreRefused) {
+    const std::vector<EmbeddedExercise> exercises{{"one", "name = \"same\"\n"},
+                                                  {"two", "name = \"same\"\n"}};
+    const auto recipe = parse_recipe(kGood, "dir/case.toml", {}, &exercises);
+    ASSERT_FALSE(recipe);
+    const std::string said(recipe.error().message().text());
+    EXPECT_NE(said.find("dir/two.toml"), std::string::npos) << said;
+    EXPECT_NE(said.find("dir/one.toml"), std::string::npos) << said;
+}
+
 TEST(Recipe, RefusesFineRegionsThatDoNotAddUp) {
     const std::pair<const char*, const char*> cases[] = {
         {"size_mm = [1, 2, 3]", "expected one of centre, label and target"},
