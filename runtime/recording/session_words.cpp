@@ -169,40 +169,40 @@ DopplerSample doppler_sample(const DopplerReport& report, const std::vector<Labe
     return sample;
 }
 
-std::string event_words(const LiveEvent& event,
-                        const Exercise& exercise,
-                        const std::vector<Label>& labels) {
-    const auto target = [&] {
+Message event_words(const LiveEvent& event,
+                    const Exercise& exercise,
+                    const std::vector<Label>& labels) {
+    const auto target = [&]() -> Message {
         const auto i = static_cast<std::size_t>(event.index);
         return event.index >= 0 && i < exercise.targets.size() && !exercise.targets[i].name.empty()
-                   ? exercise.targets[i].name
-                   : "target " + std::to_string(event.index + 1);
+                   ? Message(exercise.targets[i].name)
+                   : Message("target {}", {std::to_string(event.index + 1)});
     };
-    const auto label = [&] {
+    const auto label = [&]() -> Message {
         const auto i = static_cast<std::size_t>(event.index);
         return event.index >= 0 && i < labels.size() ? clinical_name(labels[i].name)
-                                                     : std::string("a structure");
+                                                     : "a structure";
     };
     char number[32];
-    std::snprintf(number, sizeof number, "%.0f mm", event.value);
+    std::snprintf(number, sizeof number, "%.0f", event.value);
     switch (event.kind) {
-        case LiveEventKind::needle_entry: return "Insertion " + std::to_string(event.index);
-        case LiveEventKind::needle_exit: return std::string("Needle out, was ") + number + " deep";
-        case LiveEventKind::target_hit: return "Reached: " + target();
-        case LiveEventKind::target_scanned: return "Seen: " + target();
-        case LiveEventKind::no_go_contact: return "Touched: " + label();
-        case LiveEventKind::no_go_left: return "Left: " + label();
+        case LiveEventKind::needle_entry: return {"Insertion {}", {std::to_string(event.index)}};
+        case LiveEventKind::needle_exit: return {"Needle out, was {} mm deep", {number}};
+        case LiveEventKind::target_hit: return {"Reached: {}", {target()}};
+        case LiveEventKind::target_scanned: return {"Seen: {}", {target()}};
+        case LiveEventKind::no_go_contact: return {"Touched: {}", {label()}};
+        case LiveEventKind::no_go_left: return {"Left: {}", {label()}};
         case LiveEventKind::needle_lost: return "Needle lost";
         case LiveEventKind::probe_lost: return "Probe lost";
         case LiveEventKind::step_performed: {
             const auto& steps = exercise.procedure.steps;
             const auto i = static_cast<std::size_t>(std::max(event.index, 0));
-            return i < steps.size() ? "Done: " + steps[i].title : std::string();
+            return i < steps.size() ? Message("Done: {}", {steps[i].title}) : Message();
         }
         case LiveEventKind::complication: {
             const auto titles = complication_titles();
             const auto i = static_cast<std::size_t>(std::max(event.index, 0));
-            return i < titles.size() ? titles[i] : "Complication";
+            return i < titles.size() ? Message(titles[i]) : "Complication";
         }
         default: return {};
     }

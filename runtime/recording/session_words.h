@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/base/message.h"
 #include "formats/bundle/case_bundle.h"
 #include "formats/exercise/exercise.h"
 #include "formats/recording/session.h"
@@ -38,8 +39,8 @@ DopplerSample doppler_sample(const DopplerReport& report, const std::vector<Labe
 
 // An event of an attempt in words for the trainee, "Reached: lesion"; empty for events that are not
 // shown.
-std::string event_words(const LiveEvent& event,
-                        const Exercise& exercise,
-                        const std::vector<Label>& labels);
+Message event_words(const LiveEvent& event,
+                    const Exercise& exercise,
+                    const std::vector<Label>& labels);
 
 }  // namespace sonocase::runtime::inline recording

@@ -175,6 +175,23 @@ std::string guide_json(const GuidedStart& guide) {
     return detail::json_text(out, false);
 }
 
+namespace {
+
+Json json_of(const Message& message) {
+    Json list = Json::array({std::string(message.format())});
+    for (const Message& argument : message.arguments()) list.push_back(json_of(argument));
+    return list;
+}
+
+}  // namespace
+
+std::string events_json(const PagePlayer& player) {
+    Json events = Json::array();
+    if (player.attempt() != nullptr)
+        for (const Message& words : player.attempt()->words()) events.push_back(json_of(words));
+    return detail::json_text(events, false);
+}
+
 std::string procedure_json(const PagePlayer& player) {
     const Exercise& exercise = player.exercise();
     const ProcedureRun& run = player.engine().procedure();

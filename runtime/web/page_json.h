@@ -36,6 +36,10 @@ std::string result_json(const SessionScore& score);
 // {"step", "steps", "title", "words"}; step is kGuideSteps when all are done.
 std::string guide_json(const GuidedStart& guide);
 
+// The last events of an attempt, oldest first, as a page translates them: [format, argument, ...],
+// each argument a list of the same form. "[]" without an attempt.
+std::string events_json(const PagePlayer& player);
+
 // Where the procedure of an attempt stands: {"steps": [{title, instruction, state}], "present": n,
 // "question": {item, words, options} or null, "tray": [{kind, index, amount, words}],
 // "complications": [words], and what the hands have done}. "{}" without a procedure.

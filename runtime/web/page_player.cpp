@@ -65,7 +65,7 @@ void PageSession::observe(const FrameRecord& record) {
     const std::span<const LiveEvent> events = monitor_.events();
     for (const LiveEvent& event : events) {
         session_.events.push_back(session_event(event, exercise_, bundle_.labels));
-        std::string words = event_words(event, exercise_, bundle_.labels);
+        Message words = event_words(event, exercise_, bundle_.labels);
         if (words.empty()) continue;
         words_.push_back(std::move(words));
         if (words_.size() > kWords) words_.erase(words_.begin());

@@ -55,7 +55,7 @@ class PageSession {
 
     double seconds() const;
     const SessionMonitor& monitor() const { return monitor_; }
-    const std::vector<std::string>& words() const { return words_; }  // the last six, newest last
+    const std::vector<Message>& words() const { return words_; }  // the last six, newest last
 
     // The scores are those of the recording's bytes, read again as a replay would read them.
     Result<FinishedSession> finish() const;
@@ -67,7 +67,7 @@ class PageSession {
     SessionMonitor monitor_;
     Session session_;
     ImageSettings settings_;
-    std::vector<std::string> words_;
+    std::vector<Message> words_;
 };
 
 // The Doppler modes of a page: what DopplerFrames and DopplerRun are to the desktop, with an

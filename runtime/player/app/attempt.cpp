@@ -65,7 +65,7 @@ void Attempt::observe(const FrameRecord& record,
     view_.tip_in_view = monitor.tip_in_view();
     view_.in_no_go = monitor.in_no_go();
     for (const LiveEvent& event : events) {
-        std::string words = event_words(event, exercise_, open_->bundle->labels);
+        Message words = event_words(event, exercise_, open_->bundle->labels);
         if (words.empty()) continue;
         view_.events.push_back(std::move(words));
         if (view_.events.size() > 6) view_.events.erase(view_.events.begin());

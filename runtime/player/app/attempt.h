@@ -19,8 +19,8 @@ struct AttemptView {
     int insertions = 0, targets_hit = 0;
     double depth_mm = 0;
     bool tip_in_view = false, in_no_go = false;
-    std::vector<std::string> events;  // the last ones in words, newest last; at most six
-    Message problem;                  // of the recorder, a whole sentence; empty: none
+    std::vector<Message> events;  // the last ones in words, newest last; at most six
+    Message problem;              // of the recorder, a whole sentence; empty: none
 };
 
 class Attempt {

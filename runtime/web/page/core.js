@@ -233,7 +233,7 @@ export class Core {
     }
     attempt_words() {
         this.calls.attempt_words();
-        return this.text().split('\n').filter((line) => line);
+        return JSON.parse(this.text());
     }
     // Where the procedure of the attempt stands (page_json.h); null: the exercise has none.
     procedure() {

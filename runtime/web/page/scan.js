@@ -315,32 +315,17 @@ export class ScanPage {
         this.events_said = words.join();
         $('events').replaceChildren(...words.map((line) => element('li', this.words_of_event(line))));
     }
-    // What the program says of an event (runtime/recording/session_words.h), in the language in use.
-    words_of_event(line) {
-        const [, kind, of] = /^(Insertion|Reached:|Seen:|Touched:|Left:|Done:) (.*)$/.exec(line) ?? [];
-        const target = () => {
-            const [, number] = /^target (\d+)$/.exec(of) ?? [];
-            return number ? t('target %d', number) : of;
+    // What the program says of an event, [format, argument, ...] (page_json.h), in the language in use.
+    words_of_event([format, ...values]) {
+        const said = ([words, ...inner]) => {
+            const label = this.description.labels.find((one) => one.english === words);
+            const step = this.core.procedure()?.steps.findIndex((one) => one.title === words) ?? -1;
+            if (label && /^(Touched|Left)/.test(format)) return label_words(label);
+            if (step >= 0 && format.startsWith('Done')) return exercise_texts(this.exercise()).steps?.[step]?.title || words;
+            // A target's name is the author's.
+            return inner.length > 0 || words === 'a structure' ? t(words, ...inner.map(said)) : words;
         };
-        const label = () => {
-            const known = this.description.labels.find((one) => one.english === of);
-            return known ? label_words(known) : t(of);
-        };
-        const step = () => {
-            const n = this.core.procedure()?.steps.findIndex((one) => one.title === of) ?? -1;
-            return exercise_texts(this.exercise()).steps?.[n]?.title || of;
-        };
-        const depth = /^Needle out, was (\d+) mm deep$/.exec(line);
-        if (depth) return t('Needle out, was %d mm deep', depth[1]);
-        switch (kind) {
-            case 'Insertion': return t('Insertion %d', of);
-            case 'Reached:': return t('Reached: %s', target());
-            case 'Seen:': return t('Seen: %s', target());
-            case 'Touched:': return t('Touched: %s', label());
-            case 'Left:': return t('Left: %s', label());
-            case 'Done:': return t('Done: %s', step());
-            default: return t(line);
-        }
+        return t(format, ...values.map(said));
     }
     // Steps, question and tray of a procedure; rebuilt only when something of them has changed, so that a control in
     // focus stays.

@@ -446,11 +446,9 @@ SONOCASE_EXPORT(name_at) void name_at(int column, int row) {
 SONOCASE_EXPORT(drop_attempt) void drop_attempt() {
     page.player->drop_attempt();
 }
-// The last events in words, one per line.
+// text(): the last events in words (page_json.h).
 SONOCASE_EXPORT(attempt_words) void attempt_words() {
-    page.text.clear();
-    if (!page.player->attempt()) return;
-    for (const std::string& words : page.player->attempt()->words()) page.text += words + "\n";
+    page.text = events_json(*page.player);
 }
 // text(): where the procedure of the attempt stands (page_json.h).
 SONOCASE_EXPORT(procedure) void procedure() {

@@ -414,7 +414,8 @@ await run_tests({
         const said = await page.value(`(() => {
             const {scan} = sonoplay.app, {labels} = scan.description;
             labels.push({name: 'kidney_left', english: 'left kidney', words: 'Kidney', side: 'left', number: ''});
-            const lines = ['Insertion 2', 'Needle out, was 31 mm deep', 'Reached: target 2', 'Seen: Zyste', 'Touched: left kidney', 'Left: a structure', 'Needle lost', 'Probe lost', 'Done: numbed', 'Complication'];
+            const lines = [['Insertion {}', ['2']], ['Needle out, was {} mm deep', ['31']], ['Reached: {}', ['target {}', ['2']]], ['Seen: {}', ['Zyste']],
+                ['Touched: {}', ['left kidney']], ['Left: {}', ['a structure']], ['Needle lost'], ['Probe lost'], ['Done: {}', ['numbed']], ['Complication']];
             return lines.map((line) => scan.words_of_event(line)).join('|');
         })()`);
         expect(said.startsWith('Einstich 2|Nadel draußen, war 31 mm tief|Erreicht: Ziel 2|Gesehen: Zyste|Berührt: '), said);
