@@ -34,7 +34,7 @@ void mark_closed(std::span<const PressTissue> tissues,
             for (first = j; in_lumen(j, i); ++j) {
                 const float share = samples.drains.row(j)[i];
                 height += fine_height(j) * double{columns.stretch.row(j)[i]};
-                touching += fine_height(j) * (share * kClosed + (1 - share));
+                touching += fine_height(j) * (share * kShut + (1 - share));
             }
             for (int n = first; height < touching && n < j; ++n) out.part[n * kColumns + i] = true;
         }

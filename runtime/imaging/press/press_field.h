@@ -42,7 +42,7 @@ struct PressClosed {
 };
 
 // Walls touch all along a column's way through a lumen or not at all: where its height there, over
-// parts of rows that a lumen fills to at least half, is below kClosed of its height at rest. Cost:
+// parts of rows that a lumen fills to at least half, is below kShut of its height at rest. Cost:
 // nothing where there is no lumen, 5 us where there is.
 void mark_closed(std::span<const PressTissue> tissues,
                  const PressFace& face,
@@ -126,8 +126,8 @@ class PressField {
     const PressClosed& closed_nodes() const { return work_->closed; }
 
     // True where `rest`, a place in a draining lumen, lies between walls that touch: the lumen's
-    // stretch is below 0.2 there or in the column beside it. A picture shows the wall instead, also
-    // where a lumen is too small for the columns to close it without a rest.
+    // way in that column, or in the one beside it, is shut (mark_closed). A picture shows the wall
+    // instead, also where a lumen is too small for the columns to close it without a rest.
     bool closed(Point3 rest) const;
 
   private:
