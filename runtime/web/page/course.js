@@ -73,7 +73,7 @@ function course_words(key, ...what) {
 // As plain_identifier() of the packages has it, which goes by the bytes of UTF-8.
 const plain_identifier = (name) => [...new TextEncoder().encode(name)].map((byte) => String.fromCharCode(byte).replace(/[^0-9A-Za-z]/, '-')).join('') || '-';
 // The trainee's own day and time in the form of UTC, which the program's rule reads.
-const local_time = (ms) => new Date(ms - 60000 * new Date(ms).getTimezoneOffset()).toISOString();
+const local_iso = (ms) => new Date(ms - 60000 * new Date(ms).getTimezoneOffset()).toISOString();
 // The language that the address or the learner asked for on this page; null: neither.
 function chosen_language() {
     try {
@@ -181,12 +181,12 @@ export class CourseView {
             state.attempts.forEach((one, n) => {
                 const key = `${one.started_ms} ${module.case} ${module.exercise}`;
                 const entry = attempts.get(key) ?? {case: module.case, exercise: module.exercise, passed: one.passed, exam: one.exam, values: {},
-                    started_ms: one.started_ms, started: local_time(one.started_ms)};
+                    started_ms: one.started_ms, started: local_iso(one.started_ms)};
                 if (n === state.attempts.length - 1 && module.measure && state.value !== null) entry.values[module.measure] = state.value;
                 attempts.set(key, entry);
             });
         }
-        const now = this.core.stand_in_course({today: local_time(Date.now()), attempts: [...attempts.values()].sort((a, b) => a.started_ms - b.started_ms).map(({started_ms, ...one}) => one), answers});
+        const now = this.core.stand_in_course({today: local_iso(Date.now()), attempts: [...attempts.values()].sort((a, b) => a.started_ms - b.started_ms).map(({started_ms, ...one}) => one), answers});
         this.course.modules.forEach((module, n) => {
             const one = now.modules[n];
             if (this.single()) one.open = true;  // the platform leads through the course
