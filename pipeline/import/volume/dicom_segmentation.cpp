@@ -651,7 +651,7 @@ void name_values(const std::map<int, std::uint64_t>& counts,
                            ", which it does not name: give a table of value,name");
 }
 
-void add_fields(const Object& object, const std::string& path, NativeVolume& volume) {
+void add_fields(const Object& object, NativeVolume& volume) {
     int field = 0;
     std::string codes, empty;
     for (const Segment& segment : object.segments) {
@@ -674,10 +674,9 @@ void add_fields(const Object& object, const std::string& path, NativeVolume& vol
                                                          : "LABELMAP";
     volume.notes.insert(
         volume.notes.begin(),
-        {"source", text("DICOM segmentation %s, %s, %d segments in %zu frames; spacing of %.4g x "
+        {"source", text("DICOM segmentation, %s, %d segments in %zu frames; spacing of %.4g x "
                         "%.4g x %.4g mm and places from its functional groups",
-                        std::filesystem::path(path).filename().c_str(), kind, field,
-                        object.frames.size(), spacing.x, spacing.y, spacing.z)});
+                        kind, field, object.frames.size(), spacing.x, spacing.y, spacing.z)});
     if (!codes.empty()) volume.notes.push_back({"codes", codes});
     if (!empty.empty())
         volume.warnings.push_back("segments without a voxel are left out: " + empty);
@@ -744,7 +743,7 @@ Result<NativeVolume> read_object(const std::string& path,
             SONOCASE_TRY_DONE(expect_halves(object, pixels, maximum, path, volume.warnings));
         }
     }
-    add_fields(object, path, volume);
+    add_fields(object, volume);
     return volume;
 }
 

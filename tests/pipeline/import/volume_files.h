@@ -59,6 +59,9 @@ struct DicomCounts {
     std::vector<std::int16_t> values = {};  // of all voxels, instead of the volume's own
     std::string person;  // in every element that names or describes the patient; empty: none
     std::string frame_of_reference;
+    std::string instance, acquisition, moment, description;  // empty: its own, none, ...
+    bool lossy = false;
+    std::vector<int> padding = {};  // value, and limit where there are two
 };
 // One slice of an uncompressed DICOM series of unsigned 16-bit values, explicit little-endian.
 std::string dicom_slice(const TinyVolume& volume,
