@@ -43,7 +43,7 @@ inline constexpr DicomTag kTagSyntax = 0x00020010, kTagCharacterSet = 0x00080005
                           kTagSlope = 0x00281053, kTagLossy = 0x00282110,
                           kTagPixelMeasures = 0x00289110, kTagTransformation = 0x00289145,
                           kTagSlices = 0x00540081, kTagType = 0x00620001, kTagSegments = 0x00620002,
-                          kTagSegmentNumber = 0x00620004, kTagLabel = 0x00620005,
+                          kTagCategory = 0x00620003, kTagSegmentNumber = 0x00620004, kTagLabel = 0x00620005,
                           kTagSegmentIdentification = 0x0062000a,
                           kTagReferencedSegment = 0x0062000b, kTagColour = 0x0062000d,
                           kTagMaximum = 0x0062000e, kTagPropertyType = 0x0062000f,

@@ -255,6 +255,12 @@ DicomFolder read_dicom_headers(const std::string& path) {
     return folder;
 }
 
+std::vector<std::string> paths_of(const std::vector<DicomObject>& objects) {
+    std::vector<std::string> paths;
+    for (const DicomObject& object : objects) paths.push_back(object.path);
+    return paths;
+}
+
 std::string objects_text(const std::vector<DicomObject>& objects, bool named) {
     std::map<std::string, std::vector<std::string>> names;
     for (const DicomObject& object : objects)
@@ -816,6 +822,20 @@ Result<Grid> grid_of(const DicomStack& stack, const std::string& path, NativeVol
                      static_cast<std::int32_t>(stack.slices.size())});
 }
 
+}  // namespace
+
+double shear_deg(const DicomStack& stack) {
+    if (stack.slices.size() < 2) return 0;
+    const DicomFrame &first = stack.slices.front().place(), &last = stack.slices.back().place();
+    const double off = norm(slide_of(stack)),
+                 height = dot(last.position - first.position, first.normal()),
+                 step = height / static_cast<double>(stack.slices.size() - 1);
+    if (off <= 0.2 * std::min({first.row_spacing_mm, first.column_spacing_mm, step})) return 0;
+    return std::atan2(off, height) * 180 / kPi;
+}
+
+namespace {
+
 // Whether the slices slide by more than can be squared: an error, or a warning if they are to be
 // resampled.
 Result<bool> is_sheared(const DicomStack& stack,
@@ -823,17 +843,16 @@ Result<bool> is_sheared(const DicomStack& stack,
                         bool resample,
                         const std::string& path,
                         std::vector<std::string>& warnings) {
-    const double off = norm(slide_of(stack));
+    const double degrees = shear_deg(stack);
     const Vector3 spacing = grid.spacing_mm;
-    if (off <= 0.2 * std::min({spacing.x, spacing.y, spacing.z})) return false;
+    if (!(degrees > 0)) return false;
     const std::string what = text(
         "slices are sheared against their stack by %.3g degrees (a tilted gantry): the last lies "
         "%.4g mm beside the first",
-        std::atan2(off, spacing.z * (grid.size.z - 1)) * 180 / kPi, off);
-    if (!resample)
-        return Error{what, path,
-                     "give --resample-shear, or resample the series to an orthogonal "
-                     "grid first"};
+        degrees, norm(slide_of(stack)));
+    if (!resample) return Error{what, path,
+                     std::string(kResampleShear) + "resample the series to an orthogonal grid "
+                                                   "first"};
     warnings.push_back(what + text("; each slice was moved by whole pixels, to within %.2g mm",
                                    std::hypot(spacing.x, spacing.y) / 2));
     return true;
@@ -1085,30 +1104,36 @@ Error damaged(const std::string& path) {
         path, "copy it or export it again, without compression"};
 }
 
-// Beside a segmentation: that it belongs to the scan there.
-void check_scan(const DicomObject& segmentation,
+// Beside segmentations: that they belong to the scan there.
+void check_scan(const std::vector<DicomObject>& segmentations,
                 const std::vector<DicomSlice>& slices,
                 NativeVolume& volume) {
     if (slices.empty()) return;
-    bool its_series = segmentation.series.empty(), its_frame = false;
-    for (const DicomSlice& slice : slices) {
-        its_series = its_series || slice.series == segmentation.series;
-        its_frame = its_frame || slice.frame_of_reference.empty() ||
-                    segmentation.frame_of_reference.empty() ||
-                    slice.frame_of_reference == segmentation.frame_of_reference;
+    bool their_series = true, their_frame = true;
+    for (const DicomObject& segmentation : segmentations) {
+        const auto any = [&](std::string DicomSlice::*of, const std::string& wanted) {
+            return wanted.empty() ||
+                   std::any_of(slices.begin(), slices.end(),
+                               [&](const DicomSlice& s) { return s.*of == wanted; });
+        };
+        their_series = their_series && any(&DicomSlice::series, segmentation.series);
+        their_frame =
+            their_frame &&
+            (any(&DicomSlice::frame_of_reference, segmentation.frame_of_reference) ||
+             std::any_of(slices.begin(), slices.end(),
+                         [](const DicomSlice& s) { return s.frame_of_reference.empty(); }));
     }
-    if (!its_frame)
+    if (!their_frame)
         volume.warnings.push_back(
             "the DICOM segmentation has another frame of reference than the scan beside it: it is "
             "of another examination, or was moved; check that they belong together");
-    else if (!its_series)
+    else if (!their_series)
         volume.warnings.push_back(
             "the DICOM segmentation was drawn on a series that is not the one beside it: check "
             "that they belong together");
-    volume.notes.push_back({"scan",
-                            "the labels are those of the DICOM segmentation; the slices "
-                            "beside it (" +
-                                count_text(slices) + ") hold none and were left out"});
+    volume.notes.push_back({"scan", "the labels are those of the DICOM segmentation; the slices "
+                                    "beside it (" +
+                                        count_text(slices) + ") hold none and were left out"});
 }
 
 // The distance of the slices on which the segmentation was drawn; 0: not known.
@@ -1125,6 +1150,7 @@ double scan_step_mm(const DicomObject& segmentation, std::vector<DicomSlice> sli
 // Whether the voxels are few different numbers, as those of labels are and those of a scan are not.
 bool hold_labels(const NativeVolume& volume) {
     constexpr std::size_t kMaxLabels = 160;  // a scan of 8 bits has some 250 different values
+    const bool is_signed = volume.component == Component::i8 || volume.component == Component::i16;
     std::vector<bool> seen(1 << 16, false);
     std::size_t count = 0;
     const std::size_t bytes = bytes_of(volume.component);
@@ -1134,6 +1160,10 @@ bool hold_labels(const NativeVolume& volume) {
         std::memcpy(&value, volume.bytes.data() + at, bytes);
         if (seen[value]) continue;
         seen[value] = true;
+        const int stored = !is_signed   ? value
+                           : bytes == 1 ? static_cast<std::int8_t>(value)
+                                        : static_cast<std::int16_t>(value);
+        if (volume.slope * stored + volume.intercept < 0) return false;
         if (++count > kMaxLabels) return false;
     }
     return true;
@@ -1162,19 +1192,16 @@ Status check_one_file(const DicomFolder& folder, const std::string& path) {
 Result<NativeVolume> read_headed(const DicomFolder& folder,
                                  bool resample_shear,
                                  const std::string& path) {
-    if (folder.segmentations.size() > 1)
-        return Error{"folder holds " + std::to_string(folder.segmentations.size()) +
-                         " DICOM segmentations: " + objects_text(folder.segmentations),
-                     path, "give one of them by its own path"};
     if (!folder.segmentations.empty()) {
-        const DicomObject& segmentation = folder.segmentations.front();
-        if (segmentation.cut_off)
-            return Error{"file is cut off: it ends before its pixels do", segmentation.path,
-                         "copy or export it again"};
-        SONOCASE_TRY(auto volume, read_dicom_segmentation(segmentation.path,
-                                                          scan_step_mm(segmentation, folder.slices),
-                                                          resample_shear));
-        check_scan(segmentation, folder.slices, volume);
+        for (const DicomObject& segmentation : folder.segmentations)
+            if (segmentation.cut_off)
+                return Error{"file is cut off: it ends before its pixels do", segmentation.path,
+                             "copy or export it again"};
+        SONOCASE_TRY(auto volume, read_dicom_segmentations(
+                                      paths_of(folder.segmentations),
+                                      scan_step_mm(folder.segmentations.front(), folder.slices),
+                                      resample_shear));
+        check_scan(folder.segmentations, folder.slices, volume);
         std::vector<DicomObject> others = folder.others;
         others.insert(others.end(), folder.structure_sets.begin(), folder.structure_sets.end());
         for (const std::string& file : folder.damaged) others.push_back({file, "damaged"});
@@ -1206,6 +1233,23 @@ Result<NativeVolume> read_headed(const DicomFolder& folder,
 }
 
 }  // namespace
+
+Result<bool> slices_hold_labels(const DicomFolder& folder, const std::string& path) {
+    const QuietLibrary quiet;
+    itk::Object::GlobalWarningDisplayOff();
+    try {
+        SONOCASE_TRY_DONE(check_one_file(folder, path));
+        // What is wrong with labels may be harmless in a scan.
+        const auto labels = read_slices(folder, true, path);
+        if (labels) return hold_labels(*labels);
+        SONOCASE_TRY(const auto stack, dicom_stack(folder.slices, path, {true}));
+        SONOCASE_TRY(const auto scan, read_stack(stack, true, true, path));
+        if (hold_labels(scan)) return labels.error();
+        return false;
+    } catch (const std::exception&) {
+        return damaged(path);
+    }
+}
 
 bool unpack_dicom_pixels(
     const std::string& path, int columns, int rows, int frames, int bits, char* to) {
@@ -1239,8 +1283,8 @@ bool unpack_dicom_pixels(
 
 VolumeSize size_in_dicom(const std::string& path) {
     const DicomFolder folder = read_dicom_headers(path);
-    if (folder.segmentations.size() == 1)
-        return size_in_segmentation(folder.segmentations.front().path);
+    if (!folder.segmentations.empty())
+        return size_in_segmentations(paths_of(folder.segmentations));
     const auto stack = dicom_stack(folder.slices, path, {true});
     VolumeSize size;
     if (!stack) return size;

@@ -100,6 +100,8 @@ struct DicomFolder {
 // file. Other files are skipped.
 DicomFolder read_dicom_headers(const std::string& path);
 
+std::vector<std::string> paths_of(const std::vector<DicomObject>& objects);
+
 // "2 SR (a.dcm, ...), 1 PR (b.dcm)"; empty for none. named: with file names, which no report gets,
 // as they may name the patient.
 std::string objects_text(const std::vector<DicomObject>& objects, bool named = true);
@@ -136,5 +138,13 @@ struct StackUse {
 Result<DicomStack> dicom_stack(std::vector<DicomSlice> slices,
                                const std::string& folder,
                                const StackUse& use = {});
+
+// By how many degrees the slices slide over one another (a tilted gantry) where that is too much to
+// be squared; else 0.
+double shear_deg(const DicomStack& stack);
+
+// Whether the slices are labels: few whole numbers, none below 0. Errors: such slices are not
+// sound as labels, or the slices cannot be read as a scan either. Cost: that of reading them.
+Result<bool> slices_hold_labels(const DicomFolder& folder, const std::string& path);
 
 }  // namespace sonocase::pipeline::inline import_volume

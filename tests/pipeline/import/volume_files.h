@@ -75,6 +75,7 @@ struct TinySegment {
     std::string label;
     std::vector<int> values;  // of the volume that are inside
     std::string meaning;      // of its type's code; empty: none
+    std::string code = "10200004", side = {};  // SNOMED CT: of the type, and of its modifier
 };
 struct TinyObject {
     std::string kind = "BINARY";  // FRACTIONAL, LABELMAP, or CT: its pixels are the values
