@@ -139,16 +139,17 @@ std::string side_of(const std::string& code, const std::string& texts) {
     if (code == "7771000" || code == "G-A101") return "left";
     const std::string words = lower_case(texts);
     const auto has = [&](std::initializer_list<const char*> names) {
-        return std::any_of(names.begin(), names.end(), [&](const char* name) {
-            return words.find(name) != std::string::npos;
-        });
+        return std::any_of(names.begin(), names.end(),
+                           [&](const char* name) { return words.find(name) != std::string::npos; });
     };
     const bool right = has({"right", "rechts"}), left = has({"left", "links"});
     return right == left ? "" : right ? "right" : "left";
 }
 
 // The structure that a code means; empty: not known, or of one side and it does not say which.
-std::string name_of_code(const std::string& scheme, const std::string& code, const std::string& side) {
+std::string name_of_code(const std::string& scheme,
+                         const std::string& code,
+                         const std::string& side) {
     double number = 0;
     if (scheme != "SCT" || !parse_number(code, number)) return "";
     for (const auto& [known, name] : kCodes)
@@ -233,8 +234,7 @@ Result<std::vector<Segment>> segments_of(const DicomSet& set, const std::string&
         // Older writers give the side with the region of the body.
         if (const auto regions = items_of(item, kTagRegion);
             segment.modifier.empty() && !regions.empty())
-            if (const auto sides = items_of(regions.front(), kTagRegionModifier);
-                !sides.empty()) {
+            if (const auto sides = items_of(regions.front(), kTagRegionModifier); !sides.empty()) {
                 segment.modifier = words(sides.front(), kTagMeaning);
                 side = words(sides.front(), kTagCode);
             }
@@ -776,8 +776,7 @@ void add_fields(const Object& object, NativeVolume& volume) {
         volume.fields[prefix + "Layer"] = "0";
         if (!segment.colour.empty()) volume.fields[prefix + "Color"] = segment.colour;
         if (!segment.label.empty())
-            by_code +=
-                (by_code.empty() ? "'" : ", '") + segment.label + "' is " + segment.name;
+            by_code += (by_code.empty() ? "'" : ", '") + segment.label + "' is " + segment.name;
         if (!segment.code.empty())
             codes += (codes.empty() ? "" : "; ") + segment.name + ": " + segment.code +
                      (segment.modifier.empty() ? "" : ", " + segment.modifier);
@@ -1033,8 +1032,7 @@ Result<Grid> grid_of_segmentations(const std::vector<std::string>& paths,
     for (int axis = 0; axis < 3; ++axis) {
         joined.size[axis] = high[axis] - low[axis];
         if (joined.size[axis] > 65535 || joined.size[axis] * joined.spacing_mm[axis] > kMaxTorsoMm)
-            return Error{how_many + " lie far apart", paths.front(),
-                         "expected those of one body"};
+            return Error{how_many + " lie far apart", paths.front(), "expected those of one body"};
     }
     return joined;
 } catch (const std::exception&) {
@@ -1092,8 +1090,7 @@ Result<NativeVolume> read_dicom_segmentations(const std::vector<std::string>& pa
         std::size_t v = 0;
         for (int k = 0; k < one.grid.size.z; ++k)
             for (int j = 0; j < one.grid.size.y; ++j) {
-                std::uint16_t* row =
-                    voxels + joined.grid.index(first.x, first.y + j, first.z + k);
+                std::uint16_t* row = voxels + joined.grid.index(first.x, first.y + j, first.z + k);
                 for (int i = 0; i < one.grid.size.x; ++i, ++v) {
                     const std::uint16_t value = number[value_at(v)];
                     if (value == 0) continue;
@@ -1129,8 +1126,7 @@ VolumeSize size_in_segmentations(const std::vector<std::string>& paths) {
         Object object;
         if (!read_header(paths.front(), object)) return {};
         const std::uint64_t voxels = grid->voxel_count();
-        return {voxels, voxels * (object.bits == 16 || paths.size() > 1 ? 2 : 1),
-                grid->spacing_mm};
+        return {voxels, voxels * (object.bits == 16 || paths.size() > 1 ? 2 : 1), grid->spacing_mm};
     } catch (const std::exception&) {  // reading the voxels will report it
         return {};
     }

@@ -850,9 +850,11 @@ Result<bool> is_sheared(const DicomStack& stack,
         "slices are sheared against their stack by %.3g degrees (a tilted gantry): the last lies "
         "%.4g mm beside the first",
         degrees, norm(slide_of(stack)));
-    if (!resample) return Error{what, path,
-                     std::string(kResampleShear) + "resample the series to an orthogonal grid "
-                                                   "first"};
+    if (!resample)
+        return Error{what, path,
+                     std::string(kResampleShear) +
+                         "resample the series to an orthogonal grid "
+                         "first"};
     warnings.push_back(what + text("; each slice was moved by whole pixels, to within %.2g mm",
                                    std::hypot(spacing.x, spacing.y) / 2));
     return true;
@@ -1118,10 +1120,10 @@ void check_scan(const std::vector<DicomObject>& segmentations,
         };
         their_series = their_series && any(&DicomSlice::series, segmentation.series);
         their_frame =
-            their_frame &&
-            (any(&DicomSlice::frame_of_reference, segmentation.frame_of_reference) ||
-             std::any_of(slices.begin(), slices.end(),
-                         [](const DicomSlice& s) { return s.frame_of_reference.empty(); }));
+            their_frame && (any(&DicomSlice::frame_of_reference, segmentation.frame_of_reference) ||
+                            std::any_of(slices.begin(), slices.end(), [](const DicomSlice& s) {
+                                return s.frame_of_reference.empty();
+                            }));
     }
     if (!their_frame)
         volume.warnings.push_back(
@@ -1131,9 +1133,10 @@ void check_scan(const std::vector<DicomObject>& segmentations,
         volume.warnings.push_back(
             "the DICOM segmentation was drawn on a series that is not the one beside it: check "
             "that they belong together");
-    volume.notes.push_back({"scan", "the labels are those of the DICOM segmentation; the slices "
-                                    "beside it (" +
-                                        count_text(slices) + ") hold none and were left out"});
+    volume.notes.push_back({"scan",
+                            "the labels are those of the DICOM segmentation; the slices "
+                            "beside it (" +
+                                count_text(slices) + ") hold none and were left out"});
 }
 
 // The distance of the slices on which the segmentation was drawn; 0: not known.
@@ -1283,8 +1286,7 @@ bool unpack_dicom_pixels(
 
 VolumeSize size_in_dicom(const std::string& path) {
     const DicomFolder folder = read_dicom_headers(path);
-    if (!folder.segmentations.empty())
-        return size_in_segmentations(paths_of(folder.segmentations));
+    if (!folder.segmentations.empty()) return size_in_segmentations(paths_of(folder.segmentations));
     const auto stack = dicom_stack(folder.slices, path, {true});
     VolumeSize size;
     if (!stack) return size;

@@ -129,7 +129,9 @@ Result<SourceContents> dicom_contents(const DicomFolder& folder, const std::stri
 }
 
 // DICOM files that give no labels, where nothing else does.
-Status check_dicom(const DicomFolder& folder, const SourceContents& found, const std::string& path) {
+Status check_dicom(const DicomFolder& folder,
+                   const SourceContents& found,
+                   const std::string& path) {
     if (!found.labels.empty()) return Done{};
     if (!folder.structure_sets.empty())
         return Error{"a DICOM structure set (RTSTRUCT): contours, which are not read",

@@ -453,17 +453,15 @@ std::string dicom_object(const TinyVolume& volume, const TinyObject& object) {
                 element(0x62, 4, "US", us(static_cast<std::uint16_t>(segment.number))) +
                 element(0x62, 5, "LO", segment.label);
             if (!segment.meaning.empty())
-                content +=
-                    sequence(0x62, 0xf,
-                             element(8, 0x100, "SH", segment.code) +
-                                 element(8, 0x102, "SH", "SCT") +
-                                 element(8, 0x104, "LO", segment.meaning) +
-                                 (segment.side.empty()
-                                      ? std::string()
-                                      : sequence(0x62, 0x11,
-                                                 element(8, 0x100, "SH", segment.side) +
-                                                     element(8, 0x102, "SH", "SCT") +
-                                                     element(8, 0x104, "LO", "Seite"))));
+                content += sequence(
+                    0x62, 0xf,
+                    element(8, 0x100, "SH", segment.code) + element(8, 0x102, "SH", "SCT") +
+                        element(8, 0x104, "LO", segment.meaning) +
+                        (segment.side.empty() ? std::string()
+                                              : sequence(0x62, 0x11,
+                                                         element(8, 0x100, "SH", segment.side) +
+                                                             element(8, 0x102, "SH", "SCT") +
+                                                             element(8, 0x104, "LO", "Seite"))));
             segments += item(content);
         }
         bytes += element(0x62, 2, "SQ", segments);

@@ -73,8 +73,8 @@ std::string dicom_slice(const TinyVolume& volume,
 struct TinySegment {
     int number = 1;
     std::string label;
-    std::vector<int> values;  // of the volume that are inside
-    std::string meaning;      // of its type's code; empty: none
+    std::vector<int> values;                   // of the volume that are inside
+    std::string meaning;                       // of its type's code; empty: none
     std::string code = "10200004", side = {};  // SNOMED CT: of the type, and of its modifier
 };
 struct TinyObject {
