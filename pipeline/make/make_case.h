@@ -34,8 +34,9 @@ struct MakeOptions {
     std::string out;                   // OUT/NAME.sonocase
     std::string preset;                // empty: that of the recipe
     std::vector<std::string> sets;     // SECTION.KEY=VALUE
-    bool accept_faults = false;        // publish a case in which the check finds faults
-    std::string site;                  // to publish into; empty: none
+    bool resample_shear = false;  // slanted axes too; slices of a tilted gantry are in any case
+    bool accept_faults = false;   // publish a case in which the check finds faults
+    std::string site;             // to publish into; empty: none
     PublishOptions publish;
     std::string producer;  // program and version, for the manifest
 };

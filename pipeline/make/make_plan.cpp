@@ -10,6 +10,7 @@
 #include "formats/base/digest.h"
 #include "formats/files/atomic_file.h"
 #include "pipeline/anatomy/label_table.h"
+#include "pipeline/base/text.h"
 #include "pipeline/import/volume/source_contents.h"
 #include "pipeline/import/volume/volume_file.h"
 
@@ -52,6 +53,7 @@ std::string table_beside(const std::string& labels) {
 
 Result<FoundInputs> find_inputs(const MakeOptions& options, const Decided& decided) {
     FoundInputs found;
+    found.resample_shear = options.resample_shear;
     std::string kind;
     for (const std::string& input : options.inputs) {
         SONOCASE_TRY(const auto contents, contents_of(input));
@@ -70,6 +72,12 @@ Result<FoundInputs> find_inputs(const MakeOptions& options, const Decided& decid
             found.scan = contents.scan;
             decided(
                 {"scan: " + contents.scan_kind + " in " + name_of(contents.scan), "--scan PATH"});
+        }
+        if (contents.shear_deg > 0 && !found.resample_shear) {
+            found.resample_shear = true;
+            decided({text("slices of a tilted gantry (%.3g degrees): each is moved by whole pixels",
+                          contents.shear_deg),
+                     "a series that was resampled to right angles"});
         }
         for (const std::string& other : contents.left_out)
             decided({"left out: " + other, "give it by its own path"});
@@ -225,6 +233,7 @@ Result<std::string> recipe_text(const MakeOptions& options,
         out += "label_table = " + quoted(table) + "\n";
     }
     if (options.names != "auto") out += "label_names = " + quoted(options.names) + "\n";
+    if (found.resample_shear) out += "resample_shear = true\n";
     if (!found.scan.empty()) {
         SONOCASE_TRY(const auto scan, folder.link(found.scan, "scan"));
         out += "scan = " + quoted(scan) + "      # fills in what the labels leave of the body\n";

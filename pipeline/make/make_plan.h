@@ -20,6 +20,7 @@ using Decided = std::function<void(const Decision&)>;
 // The given paths sorted out; empty: there is none.
 struct FoundInputs {
     std::string labels, scan, table;
+    bool resample_shear = false;
 };
 Result<FoundInputs> find_inputs(const MakeOptions& options, const Decided& decided);
 

@@ -43,6 +43,9 @@ int verb_make(int argc, char** argv) {
                    "Whose numbers the values are that neither the file nor a table names")
         ->check(CLI::IsMember(names_options()))
         ->capture_default_str();
+    app.add_flag("--resample-shear", options.resample_shear,
+                 "Resample a map whose axes are not at right angles; slices of a tilted gantry are "
+                 "resampled without it");
     app.add_option("--surface", options.surface,
                    "Mannequin to fit to; without one the case lies on the patient's own skin")
         ->type_name("FILE");

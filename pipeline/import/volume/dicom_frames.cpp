@@ -328,6 +328,12 @@ void read_group(const DicomSet& group, DicomFrame& frame) {
     with(kTagSegmentIdentification, [](const DicomSet& set, DicomFrame& to) {
         to.segment = short_of(set, kTagReferencedSegment);
     });
+    with(kTagFrameContent, [](const DicomSet& set, DicomFrame& to) {
+        const int acquisition = short_of(set, kTagFrameAcquisition),
+                  moment = short_of(set, kTagFrameMoment);
+        if (acquisition + moment > 0)
+            to.phase = std::to_string(acquisition) + " " + std::to_string(moment);
+    });
 }
 
 }  // namespace

@@ -10,10 +10,13 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "formats/text/excerpt.h"
 #include "formats/text/number_text.h"
+#include "pipeline/anatomy/anatomy_check.h"
+#include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/base/memory_limit.h"
 #include "pipeline/base/quiet_library.h"
 #include "pipeline/base/source_checks.h"
@@ -30,6 +33,7 @@ struct Segment {
     int number = 0;
     std::string name, code;  // code: "Liver (SCT 10200004)"
     std::string modifier;    // "Left"
+    std::string label;       // where `name` is that of the code: what the file calls it
     std::string colour;      // "0.5 0.2 0.1", or empty
     std::vector<int> frames;
     std::uint64_t voxels = 0;
@@ -79,6 +83,100 @@ bool says_nothing(const std::string& label) {
            word == "unknown" || word == "roi";
 }
 
+// Structures by their SNOMED CT code, as TotalSegmentator's own list of codes gives them (its
+// resources/totalsegmentator_snomed_mapping.csv). A name that ends in '_' has a side.
+constexpr std::pair<int, const char*> kCodes[] = {{10200004, "liver"},
+                                                  {78961009, "spleen"},
+                                                  {64033007, "kidney_"},
+                                                  {28231008, "gallbladder"},
+                                                  {15776009, "pancreas"},
+                                                  {23451007, "adrenal_gland_"},
+                                                  {69695003, "stomach"},
+                                                  {38848004, "duodenum"},
+                                                  {30315005, "small_bowel"},
+                                                  {71854001, "colon"},
+                                                  {32849002, "esophagus"},
+                                                  {89837001, "urinary_bladder"},
+                                                  {41216001, "prostate"},
+                                                  {39607008, "lung_"},
+                                                  {45653009, "lung_upper_lobe_"},
+                                                  {72481006, "lung_middle_lobe_right"},
+                                                  {90572001, "lung_lower_lobe_"},
+                                                  {44567001, "trachea"},
+                                                  {80891009, "heart"},
+                                                  {69748006, "thyroid_gland"},
+                                                  {12738006, "brain"},
+                                                  {2748008, "spinal_cord"},
+                                                  {15825003, "aorta"},
+                                                  {64131007, "inferior_vena_cava"},
+                                                  {48345005, "superior_vena_cava"},
+                                                  {32764006, "portal_vein_and_splenic_vein"},
+                                                  {110765007, "portal_vein_and_splenic_vein"},
+                                                  {122972007, "pulmonary_vein"},
+                                                  {73634005, "iliac_artery_"},
+                                                  {46027005, "iliac_vena_"},
+                                                  {32062004, "common_carotid_artery_"},
+                                                  {29700009, "subclavian_artery_"},
+                                                  {8887007, "brachiocephalic_vein_"},
+                                                  {12691009, "brachiocephalic_trunk"},
+                                                  {54735007, "sacrum"},
+                                                  {56873002, "sternum"},
+                                                  {89546000, "skull"},
+                                                  {71341001, "femur_"},
+                                                  {29836001, "hip_"},
+                                                  {85050009, "humerus_"},
+                                                  {79601000, "scapula_"},
+                                                  {51299004, "clavicula_"},
+                                                  {244849004, "autochthon_"},
+                                                  {68455001, "iliopsoas_"},
+                                                  {181674001, "gluteus_maximus_"},
+                                                  {78333006, "gluteus_medius_"},
+                                                  {75297007, "gluteus_minimus_"}};
+
+// "right" or "left" by the code of a modifier, else by the words of the texts; else empty.
+std::string side_of(const std::string& code, const std::string& texts) {
+    if (code == "24028007" || code == "G-A100") return "right";
+    if (code == "7771000" || code == "G-A101") return "left";
+    const std::string words = lower_case(texts);
+    const auto has = [&](std::initializer_list<const char*> names) {
+        return std::any_of(names.begin(), names.end(),
+                           [&](const char* name) { return words.find(name) != std::string::npos; });
+    };
+    const bool right = has({"right", "rechts"}), left = has({"left", "links"});
+    return right == left ? "" : right ? "right" : "left";
+}
+
+// The structure that a code means; empty: not known, or of one side and it does not say which.
+std::string name_of_code(const std::string& scheme,
+                         const std::string& code,
+                         const std::string& side) {
+    double number = 0;
+    if (scheme != "SCT" || !parse_number(code, number)) return "";
+    for (const auto& [known, name] : kCodes)
+        if (known == number) {
+            const std::string whole = name;
+            return !whole.ends_with('_') ? whole : side.empty() ? "" : whole + side;
+        }
+    return "";
+}
+
+// Names segments by their codes, where their labels name no structure and nothing else of the body
+// either ("liver vessels" of the code "liver"), and no other segment has the same code.
+void name_by_codes(std::vector<Segment>& segments, const std::vector<std::string>& coded) {
+    for (std::size_t n = 0; n < segments.size(); ++n) {
+        const std::string& name = coded[n];
+        std::string label = lower_case(segments[n].name);
+        std::replace(label.begin(), label.end(), ' ', '_');
+        if (name.empty() || std::count(coded.begin(), coded.end(), name) > 1 ||
+            is_known_structure(label))
+            continue;
+        const TissueChoice by_label = tissue_for_label(label);
+        if (by_label.known && by_label.tissue != tissue_for_label(name).tissue) continue;
+        segments[n].label = segments[n].name;
+        segments[n].name = name;
+    }
+}
+
 // PCS-values of 16 bits to sRGB (ICC profile connection space, D50), as text from 0 to 1.
 std::string rgb_of_lab(const DicomSet& set) {
     const std::vector<std::uint16_t> lab = shorts_of(set, kTagColour);
@@ -111,25 +209,37 @@ Result<std::vector<Segment>> segments_of(const DicomSet& set, const std::string&
         return result;
     };
     std::vector<Segment> segments;
+    std::vector<std::string> coded;
     for (const DicomSet& item : items_of(set, kTagSegments)) {
         Segment segment;
         segment.number = short_of(item, kTagSegmentNumber);
         segment.name = words(item, kTagLabel);
         segment.colour = rgb_of_lab(item);
-        std::string meaning;
+        std::string meaning, scheme, code, side;
         if (const auto types = items_of(item, kTagPropertyType); !types.empty()) {
             const DicomSet& type = types.front();
             meaning = words(type, kTagMeaning);
-            segment.code =
-                meaning + " (" + words(type, kTagScheme) + " " + words(type, kTagCode) + ")";
-            if (const auto sides = items_of(type, kTagTypeModifier); !sides.empty())
+            scheme = words(type, kTagScheme);
+            code = words(type, kTagCode);
+            segment.code = meaning + " (" + scheme + " " + code + ")";
+            if (const auto sides = items_of(type, kTagTypeModifier); !sides.empty()) {
                 segment.modifier = words(sides.front(), kTagMeaning);
+                side = words(sides.front(), kTagCode);
+            }
         }
+        // A tumour of the liver may have the code of the liver as its type.
+        if (const auto categories = items_of(item, kTagCategory);
+            !categories.empty() && words(categories.front(), kTagCode) == "49755003")
+            scheme.clear();
         // Older writers give the side with the region of the body.
         if (const auto regions = items_of(item, kTagRegion);
             segment.modifier.empty() && !regions.empty())
-            if (const auto sides = items_of(regions.front(), kTagRegionModifier); !sides.empty())
+            if (const auto sides = items_of(regions.front(), kTagRegionModifier); !sides.empty()) {
                 segment.modifier = words(sides.front(), kTagMeaning);
+                side = words(sides.front(), kTagCode);
+            }
+        coded.push_back(name_of_code(
+            scheme, code, side_of(side, segment.modifier + " " + meaning + " " + segment.name)));
         if (says_nothing(segment.name) && !meaning.empty())
             segment.name = segment.modifier.empty() ? meaning : meaning + " " + segment.modifier;
         if (segment.name.empty()) segment.name = "segment_" + std::to_string(segment.number);
@@ -140,6 +250,7 @@ Result<std::vector<Segment>> segments_of(const DicomSet& set, const std::string&
                              path, kAgain};
         segments.push_back(std::move(segment));
     }
+    name_by_codes(segments, coded);
     return segments;
 }
 
@@ -296,8 +407,8 @@ Result<FramePlaces> place_frames(const Object& object,
                      "whole number of pixels (a tilted gantry?)",
                      right[worst] * first.column_spacing_mm, down[worst] * first.row_spacing_mm),
             path,
-            "give --resample-shear, or resample the scan and its segmentation to an orthogonal "
-            "grid first"};
+            std::string(kResampleShear) +
+                "resample the scan and its segmentation to an orthogonal grid first"};
     if (off > 0.1)
         result.warnings.push_back(
             text("frames of the DICOM segmentation lie beside one lattice (a tilted gantry?): each "
@@ -651,9 +762,9 @@ void name_values(const std::map<int, std::uint64_t>& counts,
                            ", which it does not name: give a table of value,name");
 }
 
-void add_fields(const Object& object, const std::string& path, NativeVolume& volume) {
+void add_fields(const Object& object, NativeVolume& volume) {
     int field = 0;
-    std::string codes, empty;
+    std::string codes, empty, by_code;
     for (const Segment& segment : object.segments) {
         if (segment.voxels == 0) {
             if (segment.number > 0) empty += (empty.empty() ? "'" : ", '") + segment.name + "'";
@@ -664,6 +775,8 @@ void add_fields(const Object& object, const std::string& path, NativeVolume& vol
         volume.fields[prefix + "LabelValue"] = std::to_string(segment.number);
         volume.fields[prefix + "Layer"] = "0";
         if (!segment.colour.empty()) volume.fields[prefix + "Color"] = segment.colour;
+        if (!segment.label.empty())
+            by_code += (by_code.empty() ? "'" : ", '") + segment.label + "' is " + segment.name;
         if (!segment.code.empty())
             codes += (codes.empty() ? "" : "; ") + segment.name + ": " + segment.code +
                      (segment.modifier.empty() ? "" : ", " + segment.modifier);
@@ -674,11 +787,11 @@ void add_fields(const Object& object, const std::string& path, NativeVolume& vol
                                                          : "LABELMAP";
     volume.notes.insert(
         volume.notes.begin(),
-        {"source", text("DICOM segmentation %s, %s, %d segments in %zu frames; spacing of %.4g x "
+        {"source", text("DICOM segmentation, %s, %d segments in %zu frames; spacing of %.4g x "
                         "%.4g x %.4g mm and places from its functional groups",
-                        std::filesystem::path(path).filename().c_str(), kind, field,
-                        object.frames.size(), spacing.x, spacing.y, spacing.z)});
+                        kind, field, object.frames.size(), spacing.x, spacing.y, spacing.z)});
     if (!codes.empty()) volume.notes.push_back({"codes", codes});
+    if (!by_code.empty()) volume.notes.push_back({"named_by_code", by_code});
     if (!empty.empty())
         volume.warnings.push_back("segments without a voxel are left out: " + empty);
 }
@@ -744,8 +857,27 @@ Result<NativeVolume> read_object(const std::string& path,
             SONOCASE_TRY_DONE(expect_halves(object, pixels, maximum, path, volume.warnings));
         }
     }
-    add_fields(object, path, volume);
+    add_fields(object, volume);
     return volume;
+}
+
+// The voxel of `base` on which the first of `grid` lies; none if they are of two lattices.
+std::optional<Int3> place_on(const Grid& base, const Grid& grid) {
+    for (int axis = 0; axis < 3; ++axis)
+        if (norm(base.direction.column(axis) - grid.direction.column(axis)) > 1e-3)
+            return std::nullopt;
+    Int3 first{0, 0, 0};
+    const Vector3 last{grid.size.x - 1.0, grid.size.y - 1.0, grid.size.z - 1.0};
+    const Point3 low = base.voxel_from_point(grid.origin_mm),
+                 high = base.voxel_from_point(grid.point_from_voxel(Point3{} + last));
+    for (int axis = 0; axis < 3; ++axis) {
+        if (!(std::abs(low[axis]) < 1e6)) return std::nullopt;
+        first[axis] = static_cast<std::int32_t>(std::lround(low[axis]));
+        if (std::abs(low[axis] - first[axis]) > 0.1 ||
+            std::abs(high[axis] - first[axis] - last[axis]) > 0.1)
+            return std::nullopt;
+    }
+    return first;
 }
 
 }  // namespace
@@ -858,15 +990,143 @@ Result<NativeVolume> read_dicom_segmentation(const std::string& path,
     }
 }
 
-VolumeSize size_in_segmentation(const std::string& path) {
+Result<Grid> grid_of_segmentations(const std::vector<std::string>& paths,
+                                   double scan_step_mm,
+                                   bool resample_shear) try {
+    const auto name_of = [](const std::string& path) {
+        return std::filesystem::path(path).filename().string();
+    };
+    const std::string how_many = std::to_string(paths.size()) + " DICOM segmentations";
+    Grid joined;
+    Int3 low{0, 0, 0}, high{0, 0, 0};
+    std::string frame_of_reference;
+    std::map<std::string, std::string> holders;  // of a name: the first file
+    for (const std::string& path : paths) {
+        Object object;
+        SONOCASE_TRY_DONE(read_header(path, object));
+        SONOCASE_TRY(const auto where, place_frames(object, scan_step_mm, resample_shear, path));
+        const std::string frame = text_of(object.set(), kTagFrameOfReference);
+        if (&path == &paths.front()) {
+            joined = where.grid;
+            frame_of_reference = frame;
+            high = joined.size;
+        }
+        const auto first = place_on(joined, where.grid);
+        if (!first || frame != frame_of_reference)
+            return Error{how_many + ", of which " + name_of(paths.front()) + " and " +
+                             name_of(path) +
+                             (first ? " are of two frames of reference" : " lie on two lattices"),
+                         path, "give one of them by its own path"};
+        for (int axis = 0; axis < 3; ++axis) {
+            low[axis] = std::min(low[axis], (*first)[axis]);
+            high[axis] = std::max(high[axis], (*first)[axis] + where.grid.size[axis]);
+        }
+        for (const Segment& segment : object.segments)
+            if (const auto [it, is_new] = holders.emplace(segment.name, path);
+                !is_new && it->second != path)
+                return Error{how_many + ", of which " + name_of(it->second) + " and " +
+                                 name_of(path) + " both hold '" + segment.name + "'",
+                             path, "give one of them by its own path"};
+    }
+    joined.origin_mm = joined.point_from_voxel({double(low.x), double(low.y), double(low.z)});
+    for (int axis = 0; axis < 3; ++axis) {
+        joined.size[axis] = high[axis] - low[axis];
+        if (joined.size[axis] > 65535 || joined.size[axis] * joined.spacing_mm[axis] > kMaxTorsoMm)
+            return Error{how_many + " lie far apart", paths.front(), "expected those of one body"};
+    }
+    return joined;
+} catch (const std::exception&) {
+    return Error{"cannot be read as DICOM segmentations: a file is damaged", paths.front(),
+                 "copy them or export them again"};
+}
+
+Result<NativeVolume> read_dicom_segmentations(const std::vector<std::string>& paths,
+                                              double scan_step_mm,
+                                              bool resample_shear) {
+    if (paths.size() == 1)
+        return read_dicom_segmentation(paths.front(), scan_step_mm, resample_shear);
+    const QuietLibrary quiet;
+    NativeVolume joined;
+    SONOCASE_TRY(joined.grid, grid_of_segmentations(paths, scan_step_mm, resample_shear));
+    joined.component = Component::u16;
+    const double mb = 4 * static_cast<double>(joined.grid.voxel_count()) / 1e6;
+    if (mb > memory_limit_mb())
+        return Error{text("the %zu DICOM segmentations together take %.0f MB, and there are %.0f "
+                          "MB",
+                          paths.size(), mb, memory_limit_mb()),
+                     paths.front(), "coarser or cropped segmentations, or more memory"};
+    joined.bytes.resize(2 * joined.grid.voxel_count());
+    auto* voxels = reinterpret_cast<std::uint16_t*>(joined.bytes.data());
+    std::vector<std::uint64_t> counts{0};  // of each segment, whatever lies over it
+    std::uint64_t overlaps = 0;
+    std::map<std::string, std::string> notes;
+    for (const std::string& path : paths) {
+        SONOCASE_TRY(auto one, read_dicom_segmentation(path, scan_step_mm, resample_shear));
+        std::map<int, std::uint16_t> renumbered;
+        for (int n = 0; one.fields.contains("Segment" + std::to_string(n) + "_Name"); ++n) {
+            const std::string from = "Segment" + std::to_string(n) + "_";
+            const std::string to = "Segment" + std::to_string(counts.size() - 1) + "_";
+            double value = 0;
+            parse_number(one.fields[from + "LabelValue"], value);
+            renumbered[static_cast<int>(value)] = static_cast<std::uint16_t>(counts.size());
+            joined.fields[to + "Name"] = one.fields[from + "Name"];
+            joined.fields[to + "LabelValue"] = std::to_string(counts.size());
+            joined.fields[to + "Layer"] = "0";
+            if (one.fields.contains(from + "Color"))
+                joined.fields[to + "Color"] = one.fields[from + "Color"];
+            counts.push_back(0);
+        }
+        const auto value_at = [&](std::size_t v) {
+            return one.component == Component::u8
+                       ? reinterpret_cast<const std::uint8_t*>(one.bytes.data())[v]
+                       : reinterpret_cast<const std::uint16_t*>(one.bytes.data())[v];
+        };
+        const std::size_t all = one.grid.voxel_count();
+        std::vector<std::uint16_t> number(1 << 16, 0);
+        for (const auto& [from, to] : renumbered) number[static_cast<std::size_t>(from)] = to;
+        for (std::size_t v = 0; v < all; ++v)
+            if (const auto value = value_at(v); value != 0) ++counts[number[value]];
+        const Int3 first = place_on(joined.grid, one.grid).value();
+        std::size_t v = 0;
+        for (int k = 0; k < one.grid.size.z; ++k)
+            for (int j = 0; j < one.grid.size.y; ++j) {
+                std::uint16_t* row = voxels + joined.grid.index(first.x, first.y + j, first.z + k);
+                for (int i = 0; i < one.grid.size.x; ++i, ++v) {
+                    const std::uint16_t value = number[value_at(v)];
+                    if (value == 0) continue;
+                    if (row[i] != 0) ++overlaps;
+                    if (row[i] == 0 || counts[value] <= counts[row[i]]) row[i] = value;
+                }
+            }
+        for (const Note& note : one.notes)
+            if (note.name != "source")
+                notes[note.name] += (notes[note.name].empty() ? "" : "; ") + note.text;
+        for (std::string& warning : one.warnings)
+            if (std::find(joined.warnings.begin(), joined.warnings.end(), warning) ==
+                joined.warnings.end())
+                joined.warnings.push_back(std::move(warning));
+    }
+    joined.notes.push_back(
+        {"source", text("%zu DICOM segmentations of one lattice, %zu segments, numbered anew in "
+                        "the order of their files",
+                        paths.size(), counts.size() - 1)});
+    for (const auto& [name, all] : notes) joined.notes.push_back({name, all});
+    if (overlaps > 0)
+        joined.warnings.push_back(std::to_string(overlaps) +
+                                  " voxels lie in more than one DICOM segmentation and went to the "
+                                  "smaller segment");
+    return joined;
+}
+
+VolumeSize size_in_segmentations(const std::vector<std::string>& paths) {
     const QuietLibrary quiet;
     try {
+        const auto grid = grid_of_segmentations(paths, 0, true);
+        if (!grid) return {};
         Object object;
-        if (!read_header(path, object)) return {};
-        const auto where = place_frames(object, 0, true, path);
-        if (!where) return {};
-        const std::uint64_t voxels = where->grid.voxel_count();
-        return {voxels, voxels * (object.bits == 16 ? 2 : 1), where->grid.spacing_mm};
+        if (!read_header(paths.front(), object)) return {};
+        const std::uint64_t voxels = grid->voxel_count();
+        return {voxels, voxels * (object.bits == 16 || paths.size() > 1 ? 2 : 1), grid->spacing_mm};
     } catch (const std::exception&) {  // reading the voxels will report it
         return {};
     }

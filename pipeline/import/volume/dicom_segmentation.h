@@ -21,7 +21,9 @@ namespace sonocase::pipeline::inline import_volume {
 // the scan (`scan_step_mm`, 0: not known), or the least distance of two frames; places without a
 // frame are outside. Where segments overlap the smaller one remains, of two of one size the later
 // one. Of a FRACTIONAL object a voxel is inside from half of MaximumFractionalValue on. A name is
-// the Segment Label, or the type's meaning where the label says nothing or another segment has it.
+// the Segment Label; where that names nothing that is known here, the structure that the type's
+// SNOMED CT code means ("named_by_code" in the notes), or the type's meaning where the label says
+// nothing or another segment has it.
 //
 // Errors: damaged or cut off; compressed in a way that is not known; frames that belong to no
 // segment, do not say where they lie, are turned against one another, or lie on no even lattice.
@@ -31,7 +33,19 @@ Result<NativeVolume> read_dicom_segmentation(const std::string& path,
                                              double scan_step_mm,
                                              bool resample_shear);
 
-VolumeSize size_in_segmentation(const std::string& path);
+// Several as one, the smaller segment over the larger; numbered anew, from 1. Errors: as those of
+// grid_of_segmentations, and of each.
+Result<NativeVolume> read_dicom_segmentations(const std::vector<std::string>& paths,
+                                              double scan_step_mm,
+                                              bool resample_shear);
+
+// What holds several segmentations, by their headers. Errors: they are of several frames of
+// reference or lattices, or have a name in common.
+Result<Grid> grid_of_segmentations(const std::vector<std::string>& paths,
+                                   double scan_step_mm,
+                                   bool resample_shear);
+
+VolumeSize size_in_segmentations(const std::vector<std::string>& paths);
 
 // The compressed pixels of a file, of 8 or 16 bits, by GDCM; false where it cannot read them.
 bool unpack_dicom_pixels(

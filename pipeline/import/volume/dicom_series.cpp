@@ -11,7 +11,9 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <map>
+#include <tuple>
 
 #include <gdcmBitmap.h>
 #include <gdcmReader.h>
@@ -19,6 +21,7 @@
 #include <itkObject.h>
 
 #include "formats/base/constants.h"
+#include "formats/files/atomic_file.h"
 #include "formats/text/number_text.h"
 #include "pipeline/base/quiet_library.h"
 #include "pipeline/base/text.h"
@@ -34,15 +37,18 @@ namespace fs = std::filesystem;
 
 DicomSlice slice_of(const DicomSet& set) {
     DicomSlice slice;
+    slice.instance = text_of(set, kTagInstance);
     slice.series = text_of(set, kTagSeries);
     slice.acquisition = text_of(set, kTagAcquisition);
+    slice.moment = text_of(set, kTagMoment);
     slice.modality = text_of(set, kTagModality);
     slice.description = text_of(set, kTagDescription);
     slice.frame_of_reference = text_of(set, kTagFrameOfReference);
     slice.patient = text_of(set, kTagPatient);
     slice.rows = short_of(set, kTagRows);
     slice.columns = short_of(set, kTagColumns);
-    slice.frames = frames_of(set, std::max(1, whole_of(set, kTagFrames)));
+    slice.file_frames = std::max(1, whole_of(set, kTagFrames));
+    slice.frames = frames_of(set, slice.file_frames);
     slice.number = whole_of(set, kTagNumber);
     slice.declared = whole_of(set, kTagInSeries);
     if (slice.declared == 0) slice.declared = short_of(set, kTagSlices);
@@ -75,8 +81,20 @@ DicomObject object_of(const DicomSet& set, const std::string& path) {
     object.frame_of_reference = text_of(set, kTagFrameOfReference);
     object.patient = text_of(set, kTagPatient);
     const std::vector<DicomSet> series = items_of(set, kTagReferencedSeries);
-    if (!series.empty()) object.series = text_of(series.front(), kTagSeries);
+    if (series.empty()) return object;
+    object.series = text_of(series.front(), kTagSeries);
+    for (const DicomSet& image : items_of(series.front(), kTagReferencedImages))
+        object.images.push_back(text_of(image, kTagReferencedInstance));
     return object;
+}
+
+// The box of the pixels' centres of frames, where they are placed.
+void include_frame(const DicomFrame& frame, int rows, int columns, Box3& box) {
+    if (!frame.placed() || !frame.fault.empty()) return;
+    const Vector3 right = (columns - 1) * frame.column_spacing_mm * frame.along_rows,
+                  down = (rows - 1) * frame.row_spacing_mm * frame.along_columns;
+    for (const Vector3 corner : {Vector3{}, right, down, right + down})
+        box.include(frame.position + corner);
 }
 
 DicomPixels pixels_of(const DicomHeader& header) {
@@ -86,16 +104,29 @@ DicomPixels pixels_of(const DicomHeader& header) {
     pixels.bits = short_of(set, kTagBits);
     pixels.stored = short_of(set, kTagStored);
     pixels.is_signed = short_of(set, kTagSigned) == 1;
+    DicomSet rescaling = set;
     bool rescaled_by_frame = false;
     for (const DicomTag tag : {kTagShared, kTagPerFrame})
         if (const auto groups = items_of(set, tag); !groups.empty())
-            rescaled_by_frame =
-                rescaled_by_frame || !items_of(groups.front(), kTagTransformation).empty();
+            if (const auto items = items_of(groups.front(), kTagTransformation); !items.empty()) {
+                rescaled_by_frame = true;
+                rescaling = items.front();
+            }
     bool numbers = true;
     for (const auto& [tag, value] :
          {std::pair{kTagSlope, &pixels.slope}, std::pair{kTagIntercept, &pixels.intercept}})
-        if (const std::string text = text_of(set, tag); !text.empty())
+        if (const std::string text = text_of(rescaling, tag); !text.empty())
             numbers = numbers && parse_number(text, *value) && std::isfinite(*value);
+    if (const auto padding = shorts_of(set, kTagPadding); !padding.empty()) {
+        auto limit = shorts_of(set, kTagPaddingLimit);
+        if (limit.empty()) limit = padding;
+        const auto stored = [&](std::uint16_t value) {
+            return pixels.is_signed ? static_cast<std::int16_t>(value) : int{value};
+        };
+        std::tie(pixels.low, pixels.high) =
+            std::minmax({stored(padding.front()), stored(limit.front())});
+        pixels.padded = true;
+    }
     // JPEG of the first two processes knows no other way.
     pixels.lossy =
         text_of(set, kTagLossy) == "01" ||
@@ -122,6 +153,10 @@ void add_file(const std::string& path, DicomFolder& folder) {
     DicomObject object = object_of(set, path);
     if (type.starts_with("1.2.840.10008.5.1.4.1.1.66.") || object.modality == "SEG") {
         object.cut_off = is_cut_off(*header);
+        for (const DicomFrame& frame : frames_of(set, std::max(1, whole_of(set, kTagFrames)))) {
+            include_frame(frame, short_of(set, kTagRows), short_of(set, kTagColumns), object.box);
+            object.normal = frame.normal();
+        }
         folder.segmentations.push_back(std::move(object));
         return;
     }
@@ -146,6 +181,14 @@ void add_file(const std::string& path, DicomFolder& folder) {
     slice.cut_off = is_cut_off(*header);
     slice.pixels = pixels_of(*header);
     folder.slices.push_back(std::move(slice));
+}
+
+// Whether two files hold the same bytes.
+bool are_copies(const std::string& a, const std::string& b) {
+    std::error_code code;
+    if (fs::file_size(a, code) != fs::file_size(b, code) || code) return false;
+    const auto one = read_file(a), other = read_file(b);
+    return one && other && *one == *other;
 }
 
 // Where several series or examinations lie here, the scan stays that the segmentation names as its
@@ -201,18 +244,31 @@ DicomFolder read_dicom_headers(const std::string& path) {
             return !is_scan(slice) && !slice.modality.empty();
         });
     }
+    auto& labels = folder.segmentations;
+    for (std::size_t n = 0; n < labels.size(); ++n)
+        labels.erase(
+            std::remove_if(
+                labels.begin() + static_cast<std::ptrdiff_t>(n) + 1, labels.end(),
+                [&](const DicomObject& other) { return are_copies(labels[n].path, other.path); }),
+            labels.end());
     set_aside_other_scans(folder);
     return folder;
 }
 
-std::string objects_text(const std::vector<DicomObject>& objects) {
+std::vector<std::string> paths_of(const std::vector<DicomObject>& objects) {
+    std::vector<std::string> paths;
+    for (const DicomObject& object : objects) paths.push_back(object.path);
+    return paths;
+}
+
+std::string objects_text(const std::vector<DicomObject>& objects, bool named) {
     std::map<std::string, std::vector<std::string>> names;
     for (const DicomObject& object : objects)
         names[object.modality].push_back(fs::path(object.path).filename().string());
     std::string text;
     for (const auto& [modality, files] : names)
-        text += (text.empty() ? "" : ", ") + std::to_string(files.size()) + " " + modality + " (" +
-                files.front() + (files.size() > 1 ? ", ..." : "") + ")";
+        text += (text.empty() ? "" : ", ") + std::to_string(files.size()) + " " + modality +
+                (named ? " (" + files.front() + (files.size() > 1 ? ", ...)" : ")") : "");
     return text;
 }
 
@@ -226,6 +282,30 @@ constexpr double kSameSlice = 0.01;  // of the spacing: two slices in one place
 std::string name_of(const DicomSlice& slice) {
     const std::string file = fs::path(slice.path).filename().string();
     return slice.of_frame == 0 ? file : "frame " + std::to_string(slice.of_frame) + " of " + file;
+}
+
+// Removes slices that are there already: of one SOP Instance UID and place and, of labels, of the
+// same bytes. Returns how many.
+std::size_t drop_copies(std::vector<DicomSlice>& slices, bool scan) {
+    std::map<std::string, const DicomSlice*> first;
+    std::vector<DicomSlice> kept;
+    kept.reserve(slices.size());
+    for (DicomSlice& slice : slices) {
+        if (!slice.instance.empty()) {
+            const auto [other, is_new] = first.emplace(slice.instance, nullptr);
+            if (!is_new &&
+                distance(other->second->place().position, slice.place().position) < 1e-3 &&
+                (scan || are_copies(other->second->path, slice.path)))
+                continue;
+            kept.push_back(std::move(slice));
+            other->second = &kept.back();
+        } else {
+            kept.push_back(std::move(slice));
+        }
+    }
+    const std::size_t dropped = slices.size() - kept.size();
+    slices = std::move(kept);
+    return dropped;
 }
 
 // The slices of each stack that the folder could mean, in the order of their names.
@@ -386,13 +466,12 @@ Status split_frames(DicomStack& stack) {
             frames[n].position = first.position + static_cast<double>(n) * step * first.normal();
             frames[n].has_position = true;
         }
-        stack.warnings.push_back(
-            text("the DICOM file %s places only the first of its %zu frames: the others were "
-                 "taken to follow it every %.4g mm (%s) along (%.3g, %.3g, %.3g); check that the "
-                 "body is not upside down",
-                 name_of(whole).c_str(), frames.size(), step,
-                 first.between_mm > 0 ? "SpacingBetweenSlices" : "SliceThickness",
-                 -first.normal().x, -first.normal().y, first.normal().z));
+        stack.warnings.push_back(text(
+            "the DICOM file places only the first of its %zu frames: the others were "
+            "taken to follow it every %.4g mm (%s) along (%.3g, %.3g, %.3g); check that the "
+            "body is not upside down",
+            frames.size(), step, first.between_mm > 0 ? "SpacingBetweenSlices" : "SliceThickness",
+            -first.normal().x, -first.normal().y, first.normal().z));
     }
     whole.number = 0;
     stack.slices.clear();
@@ -404,12 +483,249 @@ Status split_frames(DicomStack& stack) {
     return Done{};
 }
 
-std::string series_text(const std::vector<DicomSlice>& slices) {
-    const DicomSlice& first = slices.front();
+std::size_t count_of(const std::vector<DicomSlice>& slices) {
     std::size_t count = 0;
     for (const DicomSlice& slice : slices) count += slice.frames.size();
-    return std::to_string(count) + " x " + first.modality + " from " + name_of(first) +
+    return count;
+}
+
+// "70 x CT": reports go into cases, which name no file and no description, as both may name the
+// patient.
+std::string count_text(const std::vector<DicomSlice>& slices) {
+    return std::to_string(count_of(slices)) + " x " + slices.front().modality;
+}
+
+std::string series_text(const std::vector<DicomSlice>& slices) {
+    const DicomSlice& first = slices.front();
+    return count_text(slices) + " from " + name_of(first) +
            (first.description.empty() ? "" : ", '" + first.description + "'");
+}
+
+// How well slices fit labels: images that these refer to, tenths of their box that lie in the
+// slices', and whether both run the same way.
+using Fit = std::tuple<std::size_t, int, bool>;
+Fit fit_of(const std::vector<DicomSlice>& slices, const std::vector<DicomObject>& labels) {
+    Box3 box, wanted;
+    std::vector<std::string> images;
+    bool parallel = false;
+    for (const DicomSlice& slice : slices)
+        for (const DicomFrame& frame : slice.frames)
+            include_frame(frame, slice.rows, slice.columns, box);
+    for (const DicomObject& object : labels) {
+        images.insert(images.end(), object.images.begin(), object.images.end());
+        if (object.box.empty()) continue;
+        wanted.include(object.box.lower);
+        wanted.include(object.box.upper);
+        parallel = parallel || std::abs(dot(object.normal, slices.front().place().normal())) > 0.99;
+    }
+    std::sort(images.begin(), images.end());
+    const auto referred = std::count_if(slices.begin(), slices.end(), [&](const DicomSlice& s) {
+        return std::binary_search(images.begin(), images.end(), s.instance);
+    });
+    double share = box.empty() || wanted.empty() ? 0 : 1;
+    for (int axis = 0; axis < 3; ++axis) {
+        constexpr double kHalfMm = 0.5;  // one slice has a length as well
+        const double all = wanted.upper[axis] - wanted.lower[axis] + 2 * kHalfMm;
+        const double both = std::min(wanted.upper[axis], box.upper[axis]) -
+                            std::max(wanted.lower[axis], box.lower[axis]) + 2 * kHalfMm;
+        if (share > 0) share *= std::max(0.0, both) / all;
+    }
+    return {static_cast<std::size_t>(referred), static_cast<int>(std::lround(10 * share)),
+            parallel};
+}
+
+bool are_like(const DicomFrame& a, const DicomFrame& b) {
+    return norm(a.along_rows - b.along_rows) < 1e-3 &&
+           norm(a.along_columns - b.along_columns) < 1e-3 &&
+           std::abs(a.row_spacing_mm / b.row_spacing_mm - 1) < 1e-3 &&
+           std::abs(a.column_spacing_mm / b.column_spacing_mm - 1) < 1e-3;
+}
+
+// Sets aside slices unlike most of the others: a scout, a page of text.
+void set_aside_turned(DicomStack& stack) {
+    std::vector<std::pair<const DicomFrame*, std::size_t>> kinds;
+    for (const DicomSlice& slice : stack.slices) {
+        const DicomFrame& place = slice.place();
+        if (!place.fault.empty()) return;
+        if (!place.placed() || !(place.row_spacing_mm > 0)) continue;
+        const auto kind = std::find_if(kinds.begin(), kinds.end(),
+                                       [&](const auto& k) { return are_like(*k.first, place); });
+        if (kind == kinds.end())
+            kinds.emplace_back(&place, 1);
+        else
+            ++kind->second;
+    }
+    for (const auto& [place, count] : kinds) {
+        const std::size_t odd = stack.slices.size() - count;
+        if (odd == 0 || 2 * count <= stack.slices.size()) continue;
+        const DicomFrame like = *place;
+        std::erase_if(stack.slices, [&](const DicomSlice& slice) {
+            return !slice.place().placed() || !are_like(like, slice.place());
+        });
+        stack.warnings.push_back(
+            text("%zu slice%s of the scan %s turned against the others, %s pixels of another size "
+                 "or %s nowhere, and %s left out (a scout?)",
+                 odd, odd == 1 ? "" : "s", odd == 1 ? "is" : "are", odd == 1 ? "has" : "have",
+                 odd == 1 ? "lies" : "lie", odd == 1 ? "was" : "were"));
+        return;
+    }
+}
+
+double height_of(const DicomSlice& slice, Vector3 normal) {
+    return dot(slice.place().position - Point3{}, normal);
+}
+
+// By place, then by number, then by name.
+void sort_slices(std::vector<DicomSlice>& slices, bool by_number) {
+    const Vector3 normal = slices.front().place().normal();
+    std::vector<std::tuple<double, int, std::size_t>> order;
+    for (std::size_t n = 0; n < slices.size(); ++n) {
+        // Places that differ by rounding are one.
+        const double height = height_of(slices[n], normal);
+        order.emplace_back(by_number ? std::round(height * 100) : height,
+                           by_number ? slices[n].number : 0, n);
+    }
+    std::sort(order.begin(), order.end());
+    std::vector<DicomSlice> in_order;
+    for (const auto& [place, number, n] : order) in_order.push_back(std::move(slices[n]));
+    slices = std::move(in_order);
+}
+
+// Of a scan whose slices lie several in one place: one phase.
+void choose_phase(DicomStack& stack, const StackUse& use) {
+    auto& slices = stack.slices;
+    sort_slices(slices, true);
+    const Vector3 normal = slices.front().place().normal();
+    const auto in_one_place = [&](const DicomSlice& a, const DicomSlice& b) {
+        return std::abs(height_of(a, normal) - height_of(b, normal)) < 0.01;
+    };
+    std::vector<std::size_t> turn;  // of each slice among those of its place
+    std::size_t phases = 1, last = 0;
+    bool all = true;
+    for (std::size_t n = 0; n < slices.size(); ++n) {
+        const bool again = n > 0 && in_one_place(slices[n - 1], slices[n]);
+        turn.push_back(again ? turn.back() + 1 : 0);
+        phases = std::max(phases, turn.back() + 1);
+        if (n > 0 && !again) {
+            all = all && (last == 0 || turn[n - 1] + 1 == last);
+            last = turn[n - 1] + 1;
+        }
+    }
+    if (phases == 1) return;
+    all = all && turn.back() + 1 == last;
+    using Groups = std::map<std::string, std::vector<DicomSlice>>;
+    const auto grouped = [&](const auto& key) {
+        Groups groups;
+        for (std::size_t n = 0; n < slices.size(); ++n) {
+            auto& group = groups[key(n)];
+            if (!group.empty() && in_one_place(group.back(), slices[n])) return Groups{};
+            group.push_back(slices[n]);
+        }
+        return groups.size() == phases ? groups : Groups{};
+    };
+    const char* how = "Acquisition Number";
+    Groups groups = grouped([&](std::size_t n) { return slices[n].acquisition; });
+    if (groups.empty()) {
+        how = "Temporal Position";
+        groups = grouped([&](std::size_t n) { return slices[n].moment; });
+    }
+    if (groups.empty()) {
+        how = "the numbers of their frames";
+        groups = grouped([&](std::size_t n) { return slices[n].place().phase; });
+    }
+    if (groups.empty() && all) {
+        how = "the order of their numbers";
+        groups = grouped([&](std::size_t n) { return std::to_string(turn[n]); });
+    }
+    if (groups.empty()) return;  // reported as slices that are there twice
+    // The first: by the least number, then by the frame.
+    const auto before = [](const DicomSlice& a, const DicomSlice& b) {
+        return std::tie(a.number, a.of_frame) < std::tie(b.number, b.of_frame);
+    };
+    const auto fit = [&](const std::vector<DicomSlice>& group) {
+        const auto [referred, share, parallel] = fit_of(group, use.labels);
+        return std::pair{referred, share};
+    };
+    auto best = groups.begin();
+    bool labels_tell = false;
+    for (auto it = std::next(best); it != groups.end(); ++it) {
+        const auto a = fit(it->second), b = fit(best->second);
+        labels_tell = labels_tell || a != b;
+        if (a > b ||
+            (a == b && before(*std::min_element(it->second.begin(), it->second.end(), before),
+                              *std::min_element(best->second.begin(), best->second.end(), before))))
+            best = it;
+    }
+    stack.warnings.push_back(text(
+        "the scan holds %zu phases in one place, told apart by %s: %s was taken, with %zu "
+        "slices; to take another, give a folder that holds it alone",
+        phases, how, labels_tell ? "that which the segmentation lies in or refers to" : "the first",
+        best->second.size()));
+    std::vector<DicomSlice> taken = std::move(best->second);
+    slices = std::move(taken);
+}
+
+// Of a scan in order, slices that alone are missing between two others.
+void fill_gaps(DicomStack& stack) {
+    auto& slices = stack.slices;
+    if (slices.size() < 4) return;
+    const Vector3 normal = slices.front().place().normal();
+    std::vector<double> gaps;
+    for (std::size_t n = 1; n < slices.size(); ++n)
+        gaps.push_back(height_of(slices[n], normal) - height_of(slices[n - 1], normal));
+    std::vector<double> sorted = gaps;
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    std::vector<DicomSlice> filled;
+    std::size_t missing = 0;
+    double first_at = 0;
+    for (std::size_t n = 0; n < slices.size(); ++n) {
+        filled.push_back(slices[n]);
+        if (n == gaps.size() || std::abs(gaps[n] / *middle - 2) > 2 * kMaxShift) continue;
+        DicomSlice between = slices[n];
+        DicomFrame& place = between.frames.front();
+        place.position = place.position + (slices[n + 1].place().position - place.position) / 2;
+        between.between = true;
+        if (missing++ == 0) first_at = height_of(between, normal);
+        filled.push_back(std::move(between));
+    }
+    if (missing == 0 || 10 * missing > slices.size()) return;
+    slices = std::move(filled);
+    stack.warnings.push_back(
+        text("%zu slice%s of the scan %s missing between two others, the first at %.4g mm along "
+             "the stack: the mean of its neighbours was taken; export the series again if it can "
+             "be had whole",
+             missing, missing == 1 ? "" : "s", missing == 1 ? "is" : "are", first_at));
+}
+
+// Puts the slices in order. Errors: see dicom_stack.
+Status order_stack(DicomStack& stack, const StackUse& use) {
+    for (const DicomSlice& slice : stack.slices)
+        if (slice.cut_off)
+            return Error{"file is cut off: it ends before its pixels do", slice.path,
+                         "copy or export the series again"};
+    if (count_of(stack.slices) > stack.slices.size()) {
+        SONOCASE_TRY_DONE(split_frames(stack));
+    }
+    const Status declared = check_declared(stack.slices);
+    if (use.scan) set_aside_turned(stack);
+    SONOCASE_TRY_DONE(check_places(stack.slices));
+    if (stack.slices.size() == 1) return Done{};
+    if (use.scan) choose_phase(stack, use);
+    sort_slices(stack.slices, false);
+    const std::size_t there = stack.slices.size();
+    if (use.scan) fill_gaps(stack);
+    const DicomFrame& first = stack.slices.front().place();
+    SONOCASE_TRY_DONE(check_spacing(stack.slices, stack.others, first.normal()));
+    if (stack.slices.size() == there) {
+        SONOCASE_TRY_DONE(declared);
+    }
+    const double step = dot(stack.slices.back().place().position - first.position, first.normal()) /
+                        static_cast<double>(stack.slices.size() - 1);
+    for (std::string warning :
+         {warning_of_numbers(stack.slices), warning_of_thickness(first, step)})
+        if (!warning.empty()) stack.warnings.push_back(std::move(warning));
+    return Done{};
 }
 
 }  // namespace
@@ -421,57 +737,48 @@ std::vector<std::string> series_texts(std::vector<DicomSlice> slices) {
     return texts;
 }
 
-Result<DicomStack> dicom_stack(std::vector<DicomSlice> slices, const std::string& folder) {
+Result<DicomStack> dicom_stack(std::vector<DicomSlice> slices,
+                               const std::string& folder,
+                               const StackUse& use) {
+    DicomStack stack;
+    if (const std::size_t copies = drop_copies(slices, use.scan); copies > 0)
+        stack.warnings.push_back(text("%zu DICOM slice%s there twice: the copy was left out",
+                                      copies, copies == 1 ? " is" : "s are"));
     auto series = by_series(std::move(slices));
     if (series.empty())
         return Error{"folder holds neither masks nor DICOM images", folder,
                      "expected one .nii.gz (or .nrrd, .mha) mask per structure, a DICOM "
                      "segmentation or a DICOM series"};
-    const auto count = [](const std::vector<DicomSlice>& of) {
-        std::size_t sum = 0;
-        for (const DicomSlice& slice : of) sum += slice.frames.size();
-        return sum;
+    const auto rank = [&](const std::vector<DicomSlice>& of) {
+        return std::pair{fit_of(of, use.labels), count_of(of)};
     };
-    auto largest = series.begin();
-    for (auto it = series.begin(); it != series.end(); ++it)
-        if (count(it->second) > count(largest->second)) largest = it;
-    DicomStack stack;
-    stack.slices = std::move(largest->second);
-    series.erase(largest);
-    std::vector<DicomSlice> others;
+    auto best = series.begin();
+    bool labels_tell = false;
+    for (auto it = std::next(best); it != series.end(); ++it) {
+        const auto a = rank(it->second), b = rank(best->second);
+        labels_tell = labels_tell || a.first != b.first;
+        if (a > b) best = it;
+    }
+    stack.slices = std::move(best->second);
+    series.erase(best);
+    std::string counts, list = series_text(stack.slices);
     for (auto& [uid, of_series] : series) {
-        stack.warnings.push_back("folder holds " + std::to_string(series.size() + 1) +
-                                 " DICOM series; the one with the most slices was taken (" +
-                                 series_text(stack.slices) + "), and not " +
-                                 series_text(of_series) +
-                                 ": to take another, give a folder that holds it alone");
-        others.insert(others.end(), of_series.begin(), of_series.end());
+        counts += (counts.empty() ? "" : ", ") + count_text(of_series);
+        list += "; " + series_text(of_series);
+        stack.others.insert(stack.others.end(), of_series.begin(), of_series.end());
     }
-    for (const DicomSlice& slice : stack.slices)
-        if (slice.cut_off)
-            return Error{"file is cut off: it ends before its pixels do", slice.path,
-                         "copy or export the series again"};
-    if (count(stack.slices) > stack.slices.size()) {
-        SONOCASE_TRY_DONE(split_frames(stack));
+    if (!series.empty())
+        stack.warnings.push_back(
+            "folder holds " + std::to_string(series.size() + 1) + " DICOM series; the one " +
+            (labels_tell ? "that the segmentation lies in" : "with the most slices") +
+            " was taken (" + count_text(stack.slices) + "), and not " + counts +
+            ": to take another, give a folder that holds it alone");
+    if (const auto ordered = order_stack(stack, use); !ordered) {
+        Error error = ordered.error();
+        if (!series.empty())
+            error.what += " (of " + std::to_string(series.size() + 1) + " series: " + list + ")";
+        return error;
     }
-
-    SONOCASE_TRY_DONE(check_places(stack.slices));
-    if (stack.slices.size() == 1) return stack;
-    const Vector3 normal = stack.slices.front().place().normal();
-    std::vector<std::pair<double, std::size_t>> order;
-    for (std::size_t n = 0; n < stack.slices.size(); ++n)
-        order.emplace_back(dot(stack.slices[n].place().position - Point3{}, normal), n);
-    std::sort(order.begin(), order.end());  // by place, then by name
-    std::vector<DicomSlice> in_order;
-    for (const auto& [place, n] : order) in_order.push_back(std::move(stack.slices[n]));
-    stack.slices = std::move(in_order);
-    SONOCASE_TRY_DONE(check_spacing(stack.slices, others, normal));
-    SONOCASE_TRY_DONE(check_declared(stack.slices));
-    const double step =
-        (order.back().first - order.front().first) / static_cast<double>(stack.slices.size() - 1);
-    for (std::string warning : {warning_of_numbers(stack.slices),
-                                warning_of_thickness(stack.slices.front().place(), step)})
-        if (!warning.empty()) stack.warnings.push_back(std::move(warning));
     return stack;
 }
 
@@ -515,6 +822,20 @@ Result<Grid> grid_of(const DicomStack& stack, const std::string& path, NativeVol
                      static_cast<std::int32_t>(stack.slices.size())});
 }
 
+}  // namespace
+
+double shear_deg(const DicomStack& stack) {
+    if (stack.slices.size() < 2) return 0;
+    const DicomFrame &first = stack.slices.front().place(), &last = stack.slices.back().place();
+    const double off = norm(slide_of(stack)),
+                 height = dot(last.position - first.position, first.normal()),
+                 step = height / static_cast<double>(stack.slices.size() - 1);
+    if (off <= 0.2 * std::min({first.row_spacing_mm, first.column_spacing_mm, step})) return 0;
+    return std::atan2(off, height) * 180 / kPi;
+}
+
+namespace {
+
 // Whether the slices slide by more than can be squared: an error, or a warning if they are to be
 // resampled.
 Result<bool> is_sheared(const DicomStack& stack,
@@ -522,17 +843,18 @@ Result<bool> is_sheared(const DicomStack& stack,
                         bool resample,
                         const std::string& path,
                         std::vector<std::string>& warnings) {
-    const double off = norm(slide_of(stack));
+    const double degrees = shear_deg(stack);
     const Vector3 spacing = grid.spacing_mm;
-    if (off <= 0.2 * std::min({spacing.x, spacing.y, spacing.z})) return false;
+    if (!(degrees > 0)) return false;
     const std::string what = text(
         "slices are sheared against their stack by %.3g degrees (a tilted gantry): the last lies "
         "%.4g mm beside the first",
-        std::atan2(off, spacing.z * (grid.size.z - 1)) * 180 / kPi, off);
+        degrees, norm(slide_of(stack)));
     if (!resample)
         return Error{what, path,
-                     "give --resample-shear, or resample the series to an orthogonal "
-                     "grid first"};
+                     std::string(kResampleShear) +
+                         "resample the series to an orthogonal grid "
+                         "first"};
     warnings.push_back(what + text("; each slice was moved by whole pixels, to within %.2g mm",
                                    std::hypot(spacing.x, spacing.y) / 2));
     return true;
@@ -595,16 +917,63 @@ Status append_slice(const DicomSlice& slice, itk::GDCMImageIO& io, NativeVolume&
     return Done{};
 }
 
-// The frames of one file in the order of the stack.
-void sort_frames(const DicomStack& stack, NativeVolume& volume) {
-    const std::size_t bytes = volume.bytes.size() / stack.slices.size();
-    std::vector<std::byte> sorted(volume.bytes.size());
+// The frames of the stack, in its order, from all of their file.
+void pick_frames(const DicomStack& stack, NativeVolume& volume) {
+    const std::size_t bytes =
+        volume.bytes.size() / static_cast<std::size_t>(stack.slices.front().file_frames);
+    std::vector<std::byte> sorted(bytes * stack.slices.size());
     for (std::size_t n = 0; n < stack.slices.size(); ++n)
         std::memcpy(
             sorted.data() + n * bytes,
             volume.bytes.data() + static_cast<std::size_t>(stack.slices[n].of_frame - 1) * bytes,
             bytes);
     volume.bytes = std::move(sorted);
+}
+
+// What a scan's slices need after reading: padding becomes air, and slices that are in no file the
+// mean of their neighbours. scaled: the values are Hounsfield units already.
+template <class T>
+void finish_slices(const DicomStack& stack, bool scaled, NativeVolume& volume) {
+    constexpr double kAirHu = -1000;
+    T* voxels = reinterpret_cast<T*>(volume.bytes.data());
+    const std::size_t count = volume.grid.voxel_count() / stack.slices.size();
+    const auto clamped = [](double value) {
+        return static_cast<T>(std::clamp(std::round(value),
+                                         static_cast<double>(std::numeric_limits<T>::lowest()),
+                                         static_cast<double>(std::numeric_limits<T>::max())));
+    };
+    for (std::size_t n = 0; n < stack.slices.size(); ++n) {
+        const DicomPixels& pixels = stack.slices[n].pixels;
+        if (!pixels.padded || stack.slices[n].modality != "CT" || !(pixels.slope > 0)) continue;
+        const double slope = scaled ? pixels.slope : 1, intercept = scaled ? pixels.intercept : 0;
+        const double low = slope * pixels.low + intercept - 0.5 * slope,
+                     high = slope * pixels.high + intercept + 0.5 * slope;
+        const T air = clamped(scaled ? kAirHu : (kAirHu - pixels.intercept) / pixels.slope);
+        for (T* v = voxels + n * count; v != voxels + (n + 1) * count; ++v)
+            if (const auto value = static_cast<double>(*v); value > low && value < high) *v = air;
+    }
+    for (std::size_t n = 0; n < stack.slices.size(); ++n) {
+        if (!stack.slices[n].between) continue;
+        const T *before = voxels + (n - 1) * count, *after = voxels + (n + 1) * count;
+        for (std::size_t v = 0; v < count; ++v)
+            voxels[n * count + v] =
+                clamped((static_cast<double>(before[v]) + static_cast<double>(after[v])) / 2);
+    }
+}
+
+void finish_scan(const DicomStack& stack, bool scaled, NativeVolume& volume) {
+    switch (volume.component) {
+        case Component::u8: return finish_slices<std::uint8_t>(stack, scaled, volume);
+        case Component::i8: return finish_slices<std::int8_t>(stack, scaled, volume);
+        case Component::u16: return finish_slices<std::uint16_t>(stack, scaled, volume);
+        case Component::i16: return finish_slices<std::int16_t>(stack, scaled, volume);
+        case Component::u32: return finish_slices<std::uint32_t>(stack, scaled, volume);
+        case Component::i32: return finish_slices<std::int32_t>(stack, scaled, volume);
+        case Component::f32: return finish_slices<float>(stack, scaled, volume);
+        case Component::f64: return finish_slices<double>(stack, scaled, volume);
+        case Component::u64:
+        case Component::i64: break;  // DICOM has none
+    }
 }
 
 // Reads pixels that are stored as they are or as run lengths, without GDCM, which ends the program
@@ -626,6 +995,7 @@ Status read_plain_pixels(const DicomStack& stack, NativeVolume& volume) {
     std::string unpacked;  // the file that they are of
     for (std::size_t n = 0; n < stack.slices.size(); ++n) {
         const DicomSlice& slice = stack.slices[n];
+        if (slice.between) continue;
         std::byte* to = volume.bytes.data() + n * bytes;
         const auto frame = static_cast<std::size_t>(std::max(0, slice.of_frame - 1));
         if (kind.run_lengths) {
@@ -663,13 +1033,19 @@ Status read_plain_pixels(const DicomStack& stack, NativeVolume& volume) {
 
 Result<NativeVolume> read_stack(const DicomStack& stack,
                                 bool resample_shear,
+                                bool scan,
                                 const std::string& path) {
-    for (const DicomSlice& slice : stack.slices)
-        if (slice.pixels.lossy)
-            return Error{"the pixels were compressed with loss (JPEG), which changes label values",
-                         slice.path, "export the labels again, without compression"};
     NativeVolume volume;
     volume.warnings = stack.warnings;
+    const auto lossy = std::find_if(stack.slices.begin(), stack.slices.end(),
+                                    [](const DicomSlice& s) { return s.pixels.lossy; });
+    if (lossy != stack.slices.end() && !scan)
+        return Error{"the pixels were compressed with loss (JPEG), which changes label values",
+                     lossy->path, "export the labels again, without compression"};
+    if (lossy != stack.slices.end())
+        volume.warnings.push_back(
+            "the pixels of the scan were compressed with loss (JPEG): its Hounsfield units are "
+            "those of the copy; where the archive has it without loss, take that");
     SONOCASE_TRY(volume.grid, grid_of(stack, path, volume));
     SONOCASE_TRY(const bool sheared,
                  is_sheared(stack, volume.grid, resample_shear, path, volume.warnings));
@@ -679,12 +1055,19 @@ Result<NativeVolume> read_stack(const DicomStack& stack,
                    slice.pixels.is_like(first.pixels);
         })) {
         SONOCASE_TRY_DONE(read_plain_pixels(stack, volume));
+        if (scan) finish_scan(stack, false, volume);
         if (sheared) unshear(stack, volume);
         return volume;
     }
     const bool one_file = first.of_frame > 0;
     for (const DicomSlice& slice : stack.slices) {
         if (one_file && &slice != &first) break;
+        if (slice.between) {  // is filled in below
+            volume.bytes.resize(volume.bytes.size() + static_cast<std::size_t>(slice.rows) *
+                                                          static_cast<std::size_t>(slice.columns) *
+                                                          bytes_of(volume.component));
+            continue;
+        }
         if (!slice.pixels.sound)
             return Error{"pixels that are not one whole number each", slice.path, kSliceExpected};
         try {
@@ -695,7 +1078,7 @@ Result<NativeVolume> read_stack(const DicomStack& stack,
                 io->GetNumberOfDimensions() > 2 ? std::size_t(io->GetDimensions(2)) : 1;
             if (int(io->GetDimensions(0)) != slice.columns ||
                 int(io->GetDimensions(1)) != slice.rows ||
-                frames != (one_file ? stack.slices.size() : 1))
+                frames != static_cast<std::size_t>(one_file ? slice.file_frames : 1))
                 return Error{"slice of " + size_text(*io) + " where its header says " +
                                  std::to_string(slice.columns) + " x " + std::to_string(slice.rows),
                              slice.path, kSliceExpected};
@@ -710,7 +1093,8 @@ Result<NativeVolume> read_stack(const DicomStack& stack,
                 slice.path, "export the series again, without compression"};
         }
     }
-    if (one_file) sort_frames(stack, volume);
+    if (one_file) pick_frames(stack, volume);
+    if (scan) finish_scan(stack, true, volume);
     if (sheared) unshear(stack, volume);
     return volume;
 }
@@ -722,37 +1106,44 @@ Error damaged(const std::string& path) {
         path, "copy it or export it again, without compression"};
 }
 
-// Beside a segmentation: that it belongs to the scan there.
-void check_scan(const DicomObject& segmentation,
+// Beside segmentations: that they belong to the scan there.
+void check_scan(const std::vector<DicomObject>& segmentations,
                 const std::vector<DicomSlice>& slices,
                 NativeVolume& volume) {
     if (slices.empty()) return;
-    bool its_series = segmentation.series.empty(), its_frame = false;
-    for (const DicomSlice& slice : slices) {
-        its_series = its_series || slice.series == segmentation.series;
-        its_frame = its_frame || slice.frame_of_reference.empty() ||
-                    segmentation.frame_of_reference.empty() ||
-                    slice.frame_of_reference == segmentation.frame_of_reference;
+    bool their_series = true, their_frame = true;
+    for (const DicomObject& segmentation : segmentations) {
+        const auto any = [&](std::string DicomSlice::*of, const std::string& wanted) {
+            return wanted.empty() ||
+                   std::any_of(slices.begin(), slices.end(),
+                               [&](const DicomSlice& s) { return s.*of == wanted; });
+        };
+        their_series = their_series && any(&DicomSlice::series, segmentation.series);
+        their_frame =
+            their_frame && (any(&DicomSlice::frame_of_reference, segmentation.frame_of_reference) ||
+                            std::any_of(slices.begin(), slices.end(), [](const DicomSlice& s) {
+                                return s.frame_of_reference.empty();
+                            }));
     }
-    const std::string name = fs::path(segmentation.path).filename().string();
-    if (!its_frame)
+    if (!their_frame)
         volume.warnings.push_back(
-            name +
-            " has another frame of reference than the scan beside it: it is of another "
-            "examination, or was moved; check that they belong together");
-    else if (!its_series)
-        volume.warnings.push_back(name +
-                                  " was drawn on a series that is not the one beside it: check "
-                                  "that they belong together");
-    volume.notes.push_back({"scan", "the labels are those of " + name + "; the scan beside it (" +
-                                        series_text(slices) + ") has none and was left out"});
+            "the DICOM segmentation has another frame of reference than the scan beside it: it is "
+            "of another examination, or was moved; check that they belong together");
+    else if (!their_series)
+        volume.warnings.push_back(
+            "the DICOM segmentation was drawn on a series that is not the one beside it: check "
+            "that they belong together");
+    volume.notes.push_back({"scan",
+                            "the labels are those of the DICOM segmentation; the slices "
+                            "beside it (" +
+                                count_text(slices) + ") hold none and were left out"});
 }
 
 // The distance of the slices on which the segmentation was drawn; 0: not known.
 double scan_step_mm(const DicomObject& segmentation, std::vector<DicomSlice> slices) {
     std::erase_if(slices,
                   [&](const DicomSlice& slice) { return slice.series != segmentation.series; });
-    const auto stack = dicom_stack(std::move(slices), segmentation.path);
+    const auto stack = dicom_stack(std::move(slices), segmentation.path, {true, {segmentation}});
     if (!stack || stack->slices.size() < 2) return 0;
     const DicomFrame &first = stack->slices.front().place(), &last = stack->slices.back().place();
     return dot(last.position - first.position, first.normal()) /
@@ -762,6 +1153,7 @@ double scan_step_mm(const DicomObject& segmentation, std::vector<DicomSlice> sli
 // Whether the voxels are few different numbers, as those of labels are and those of a scan are not.
 bool hold_labels(const NativeVolume& volume) {
     constexpr std::size_t kMaxLabels = 160;  // a scan of 8 bits has some 250 different values
+    const bool is_signed = volume.component == Component::i8 || volume.component == Component::i16;
     std::vector<bool> seen(1 << 16, false);
     std::size_t count = 0;
     const std::size_t bytes = bytes_of(volume.component);
@@ -771,6 +1163,10 @@ bool hold_labels(const NativeVolume& volume) {
         std::memcpy(&value, volume.bytes.data() + at, bytes);
         if (seen[value]) continue;
         seen[value] = true;
+        const int stored = !is_signed   ? value
+                           : bytes == 1 ? static_cast<std::int8_t>(value)
+                                        : static_cast<std::int16_t>(value);
+        if (volume.slope * stored + volume.intercept < 0) return false;
         if (++count > kMaxLabels) return false;
     }
     return true;
@@ -781,31 +1177,39 @@ Result<NativeVolume> read_slices(const DicomFolder& folder,
                                  const std::string& path) {
     SONOCASE_TRY(auto stack, dicom_stack(folder.slices, path));
     if (!folder.others.empty())
-        stack.warnings.push_back("left out of the DICOM folder: " + objects_text(folder.others));
-    return read_stack(stack, resample_shear, path);
+        stack.warnings.push_back("left out of the DICOM folder: " +
+                                 objects_text(folder.others, false));
+    return read_stack(stack, resample_shear, false, path);
+}
+
+// One file holds a whole stack, or is no stack.
+Status check_one_file(const DicomFolder& folder, const std::string& path) {
+    std::error_code code;
+    if (fs::is_directory(path, code)) return Done{};
+    if (folder.slices.empty()) return damaged(path);
+    if (folder.slices.front().frames.size() == 1)
+        return Error{"one DICOM slice of a series", path, "give the folder of the series"};
+    return Done{};
 }
 
 Result<NativeVolume> read_headed(const DicomFolder& folder,
                                  bool resample_shear,
                                  const std::string& path) {
-    if (folder.segmentations.size() > 1)
-        return Error{"folder holds " + std::to_string(folder.segmentations.size()) +
-                         " DICOM segmentations: " + objects_text(folder.segmentations),
-                     path, "give one of them by its own path"};
     if (!folder.segmentations.empty()) {
-        const DicomObject& segmentation = folder.segmentations.front();
-        if (segmentation.cut_off)
-            return Error{"file is cut off: it ends before its pixels do", segmentation.path,
-                         "copy or export it again"};
-        SONOCASE_TRY(auto volume, read_dicom_segmentation(segmentation.path,
-                                                          scan_step_mm(segmentation, folder.slices),
-                                                          resample_shear));
-        check_scan(segmentation, folder.slices, volume);
+        for (const DicomObject& segmentation : folder.segmentations)
+            if (segmentation.cut_off)
+                return Error{"file is cut off: it ends before its pixels do", segmentation.path,
+                             "copy or export it again"};
+        SONOCASE_TRY(auto volume, read_dicom_segmentations(
+                                      paths_of(folder.segmentations),
+                                      scan_step_mm(folder.segmentations.front(), folder.slices),
+                                      resample_shear));
+        check_scan(folder.segmentations, folder.slices, volume);
         std::vector<DicomObject> others = folder.others;
         others.insert(others.end(), folder.structure_sets.begin(), folder.structure_sets.end());
         for (const std::string& file : folder.damaged) others.push_back({file, "damaged"});
         if (!others.empty())
-            volume.notes.push_back({"left_out", "of the folder: " + objects_text(others)});
+            volume.notes.push_back({"left_out", "of the folder: " + objects_text(others, false)});
         return volume;
     }
     if (!folder.structure_sets.empty()) {
@@ -813,9 +1217,8 @@ Result<NativeVolume> read_headed(const DicomFolder& folder,
         if (auto slices = read_slices(folder, resample_shear, path);
             slices && hold_labels(*slices)) {
             slices->warnings.push_back(
-                "the contours of " +
-                fs::path(folder.structure_sets.front().path).filename().string() +
-                " (RTSTRUCT) are not read: the labels are the values of the slices beside it");
+                "the contours of the structure set (RTSTRUCT) are not read: the labels are the "
+                "values of the slices beside it");
             return slices;
         }
         return Error{"a DICOM structure set (RTSTRUCT): contours, which are not read",
@@ -828,16 +1231,28 @@ Result<NativeVolume> read_headed(const DicomFolder& folder,
     if (folder.slices.empty() && !folder.others.empty())
         return Error{"holds no labels: " + objects_text(folder.others), path,
                      "expected a DICOM segmentation, or slices whose pixels are label values"};
-    std::error_code code;
-    if (!fs::is_directory(path, code)) {
-        if (folder.slices.empty()) return damaged(path);
-        if (folder.slices.front().frames.size() == 1)
-            return Error{"one DICOM slice of a series", path, "give the folder of the series"};
-    }
+    SONOCASE_TRY_DONE(check_one_file(folder, path));
     return read_slices(folder, resample_shear, path);
 }
 
 }  // namespace
+
+Result<bool> slices_hold_labels(const DicomFolder& folder, const std::string& path) {
+    const QuietLibrary quiet;
+    itk::Object::GlobalWarningDisplayOff();
+    try {
+        SONOCASE_TRY_DONE(check_one_file(folder, path));
+        // What is wrong with labels may be harmless in a scan.
+        const auto labels = read_slices(folder, true, path);
+        if (labels) return hold_labels(*labels);
+        SONOCASE_TRY(const auto stack, dicom_stack(folder.slices, path, {true}));
+        SONOCASE_TRY(const auto scan, read_stack(stack, true, true, path));
+        if (hold_labels(scan)) return labels.error();
+        return false;
+    } catch (const std::exception&) {
+        return damaged(path);
+    }
+}
 
 bool unpack_dicom_pixels(
     const std::string& path, int columns, int rows, int frames, int bits, char* to) {
@@ -871,9 +1286,8 @@ bool unpack_dicom_pixels(
 
 VolumeSize size_in_dicom(const std::string& path) {
     const DicomFolder folder = read_dicom_headers(path);
-    if (folder.segmentations.size() == 1)
-        return size_in_segmentation(folder.segmentations.front().path);
-    const auto stack = dicom_stack(folder.slices, path);
+    if (!folder.segmentations.empty()) return size_in_segmentations(paths_of(folder.segmentations));
+    const auto stack = dicom_stack(folder.slices, path, {true});
     VolumeSize size;
     if (!stack) return size;
     for (const DicomSlice& slice : stack->slices)
@@ -889,8 +1303,10 @@ Result<NativeVolume> read_dicom_scan(const std::string& path, bool resample_shea
     try {
         const DicomFolder folder = read_dicom_headers(path);
         if (folder.slices.empty()) return Error{"holds no slices of a scan", path, "expected a CT"};
-        SONOCASE_TRY(const auto stack, dicom_stack(folder.slices, path));
-        return read_stack(stack, resample_shear, path);
+        SONOCASE_TRY_DONE(check_one_file(folder, path));
+        SONOCASE_TRY(const auto stack,
+                     dicom_stack(folder.slices, path, {true, folder.segmentations}));
+        return read_stack(stack, resample_shear, true, path);
     } catch (const std::exception&) {
         return damaged(path);
     }

@@ -106,6 +106,9 @@ inline bool is_nifti_name(const std::string& path) {
     return has_ending(path, ".nii") || has_ending(path, ".nii.gz");
 }
 
+inline constexpr const char* kResampleShear =
+    "give --resample-shear to import or make (resample_shear = true in [inputs] of a recipe), or ";
+
 // Gives the volume the grid of a placement, and its warnings. Axes that are off right angles by
 // less than a tenth of a voxel over the whole volume are squared off about its middle, with a
 // warning that says how far that moves a voxel. Errors: axes of no length; axes farther off, unless

@@ -17,15 +17,19 @@ struct SourceContents {
     std::string labels_kind;            // "DICOM segmentation", "folder of 104 masks", "label map"
     std::string scan_kind;              // "112 CT slices", "NIfTI, NRRD or MetaImage scan"
     std::vector<std::string> left_out;  // what else lies there, a phrase each
+    double shear_deg = 0;  // of the slices of a tilted gantry, which need VolumeReading's
+                           // resample_shear; 0: there are none
 };
 
 // Looks at headers, and at the values of volume files whose names are no structure's: labels are
 // few whole numbers, none below 0. A folder may hold
 //
-//     a DICOM segmentation beside its slices, at any depth, or either alone
+//     a DICOM segmentation, or several that can be joined, beside its slices, at any depth, or
+//     either alone
 //     masks, one per structure, as TotalSegmentator writes them
 //     a label map, a scan, or one of each
-//     sub-folders that together hold no more than that, such as ct.nii.gz beside segmentations/
+//     sub-folders that together hold no more than that, such as ct.nii.gz beside segmentations/, or
+//     masks beside DICOM slices
 //
 // Errors, each with what is there and what to give instead: no such path; nothing that is known;
 // several label maps, segmentations or scans; files of two patients (of two Patient IDs, in two

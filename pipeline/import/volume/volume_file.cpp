@@ -342,9 +342,10 @@ Result<LabelLayers> read_label_layers(const std::string& path, const VolumeReadi
 
 Result<ScanVolume> read_scan(const std::string& path, const VolumeReading& reading) {
     std::error_code code;
-    const bool folder = fs::is_directory(path, code);
-    SONOCASE_TRY(auto native, folder ? read_dicom_scan(path, reading.resample_shear)
-                                     : read_native(path, reading));
+    const bool dicom = fs::is_directory(path, code) ||
+                       (check_source_file(path, "expected a volume file") && is_dicom_file(path));
+    SONOCASE_TRY(auto native, dicom ? read_dicom_scan(path, reading.resample_shear)
+                                    : read_native(path, reading));
     if (native.layers != 1)
         return Error{"scan of " + std::to_string(native.layers) + " values per voxel", path,
                      "expected one: a CT"};

@@ -1115,8 +1115,8 @@ Status place_volume(const Placement& placement,
                           "by %.3g mm (a tilted gantry?)",
                           moved),
                      path,
-                     "give --resample-shear, or resample the volume to an orthogonal grid (Slicer: "
-                     "Resample Image)"};
+                     std::string(kResampleShear) +
+                         "resample the volume to an orthogonal grid (Slicer: Resample Image)"};
     volume.slanted = placement;
     volume.warnings.push_back(
         text("voxel axes are not at right angles (squaring them off would move voxels by %.3g mm): "

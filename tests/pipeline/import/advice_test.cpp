@@ -328,8 +328,10 @@ TEST_F(Advice, OfDicomLeadsToLabels) {
         series("gap");
         return import_label_map(folder_ / "gap");
     });
-    for (const char* name : {"two/a.dcm", "two/b.dcm"})
-        folder_.write(name, testing::dicom_object(volume_, segmentation()));
+    testing::TinyObject other = segmentation();
+    other.thickness_mm = 2;
+    folder_.write("two/a.dcm", testing::dicom_object(volume_, other));
+    folder_.write("two/b.dcm", testing::dicom_object(volume_, segmentation()));
     expect("2 DICOM segmentations", "one of them by its own path", at(folder_ / "two"),
            at(folder_ / "two/b.dcm"));
     testing::TinyObject contours = segmentation();

@@ -9,6 +9,7 @@
 #include <fstream>
 
 #include "pipeline/import/volume/label_map.h"
+#include "pipeline/import/volume/source_contents.h"
 #include "pipeline/import/volume/volume_file.h"
 #include "support/paths.h"
 #include "support/temporary_folder.h"
@@ -261,6 +262,9 @@ TEST_F(DicomSegmentation, IsFoundBesideItsScanAndInSubfolders) {
     const auto result = import_label_map(folder_ / "study");
     expect_body(result);
     EXPECT_NE(note(result, "scan").find("16 x CT"), std::string::npos);
+    write("study/seg/b.dcm");  // a copy
+    expect_body(import_label_map(folder_ / "study"));
+    object_.thickness_mm = 2;
     write("study/seg/b.dcm");
     expect_refused(import_label_map(folder_ / "study"), "2 DICOM segmentations");
     // The series alone is read as it was, from sub-folders too.
@@ -268,6 +272,127 @@ TEST_F(DicomSegmentation, IsFoundBesideItsScanAndInSubfolders) {
     const auto series = import_label_map(folder_ / "study");
     ASSERT_TRUE(series) << series.error().message();
     EXPECT_EQ(series->labels.grid.size, volume_.size);
+}
+
+TEST_F(DicomSegmentation, IsNamedByCodesWhereItsLabelsSayNothingHere) {
+    object_.segments = {{1, "Organ 5 AI", {kLiver}, "Leber"},
+                        {2, "Milz", {kSpleen}, "Milz", "78961009"},
+                        {3, "Niere", {kKidneyRight}, "Niere", "64033007", "24028007"}};
+    const auto coded = imported();
+    ASSERT_TRUE(coded) << coded.error().message();
+    const auto name_of = [](const Result<ImportedLabels>& result, std::size_t n) {
+        return result ? result->labels.labels.at(n).name : "";
+    };
+    EXPECT_EQ(name_of(coded, 1), "liver");
+    EXPECT_EQ(name_of(coded, 2), "spleen");
+    EXPECT_EQ(name_of(coded, 3), "kidney_right");
+    EXPECT_EQ(note(coded, "named_by_code"),
+              "'Organ 5 AI' is liver, 'Milz' is spleen, 'Niere' is kidney_right");
+    // A part or a tumour with the code of its organ, two of one code, a side that nobody says.
+    object_.segments = {{1, "liver tumor", {kLiver}, "Liver"},
+                        {2, "Niere", {kSpleen}, "Niere", "64033007"},
+                        {3, "kidney left", {kKidneyRight}, "Niere", "64033007", "24028007"}};
+    const auto labelled = imported();
+    ASSERT_TRUE(labelled) << labelled.error().message();
+    for (std::size_t n = 0; n < 3; ++n) {
+        std::string label = object_.segments[n].label;
+        EXPECT_EQ(name_of(labelled, n + 1), label);
+    }
+    object_.segments[0].label = "Abschnitt A";
+    object_.segments[1] = {2, "Abschnitt B", {kSpleen}, "Leber"};
+    EXPECT_EQ(name_of(imported(), 1), "Abschnitt A");
+}
+
+// One file for each organ, as some programs write them, each with its own frames alone.
+TEST_F(DicomSegmentation, OfOneFileForEachOrganIsOne) {
+    const auto all = object_.segments;
+    const auto write_each = [&](const std::string& folder) {
+        for (const auto& segment : all) {
+            object_.segments = {segment};
+            object_.segments.front().number = 1;
+            write(folder + "/" + segment.label + ".dcm");
+        }
+    };
+    write_each("seg");
+    const auto result = import_label_map(folder_ / "seg");
+    expect_body(result);
+    EXPECT_NE(note(result, "source").find("3 DICOM segmentations"), std::string::npos);
+    EXPECT_EQ(size_in_headers(folder_ / "seg").voxels, result->labels.voxels.size());
+    const auto contents = contents_of(folder_ / "seg");
+    ASSERT_TRUE(contents) << contents.error().message();
+    EXPECT_EQ(contents->labels_kind, "3 DICOM segmentations");
+    // The smaller lies over the larger.
+    object_.segments = {{1, "body", {kLiver, kSpleen, kKidneyRight}, ""}};
+    write("seg/a.dcm");
+    const auto over = import_label_map(folder_ / "seg");
+    expect_body(over);
+    EXPECT_TRUE(warns(over, "voxels lie in more than one DICOM segmentation"));
+    std::filesystem::remove(folder_ / "seg/a.dcm");
+    // Of another frame of reference, or off the lattice.
+    object_.segments = {{1, "colon", {kLiver}, ""}};
+    object_.frame_of_reference = "1.2.3.99";
+    write("seg/z.dcm");
+    expect_refused(import_label_map(folder_ / "seg"), "are of two frames of reference");
+    object_.frame_of_reference = "1.2.3.7";
+    volume_.origin.x += 0.7;
+    write("seg/z.dcm");
+    expect_refused(import_label_map(folder_ / "seg"), "lie on two lattices");
+    volume_.origin.x -= 0.7;
+    object_.segments[0].label = "liver";
+    write("seg/z.dcm");
+    expect_refused(import_label_map(folder_ / "seg"), "liver.dcm and z.dcm both hold 'liver'");
+}
+
+TEST_F(DicomSegmentation, OrMasksBesideSlicesAreTheirLabels) {
+    testing::DicomCounts counts;
+    counts.is_signed = true;
+    for (std::size_t n = 0; n < volume_.voxels.size(); ++n)
+        counts.values.push_back(static_cast<std::int16_t>(n % 1000 - 500));
+    const auto write_slices = [&](const std::string& folder, const std::string& series, int first) {
+        for (int k = first; k < volume_.size.z; ++k)
+            folder_.write(folder + "/s" + std::to_string(k),
+                          testing::dicom_slice(volume_, k, series, counts));
+    };
+    const auto mask = [&](int label) {
+        TinyVolume one = volume_;
+        for (std::uint8_t& voxel : one.voxels) voxel = voxel == label ? 1 : 0;
+        return testing::nifti_bytes(one);
+    };
+    write_slices("w/DICOM/CT", "1.2.3.5", 0);
+    folder_.write("w/segmentations/liver.nii", mask(kLiver));
+    folder_.write("w/segmentations/spleen.nii", mask(kSpleen));
+    const auto masks = contents_of(folder_ / "w");
+    ASSERT_TRUE(masks) << masks.error().message();
+    EXPECT_EQ(masks->labels, folder_ / "w/segmentations");
+    EXPECT_EQ(masks->scan, folder_ / "w/DICOM/CT");
+    EXPECT_EQ(masks->scan_kind, "16 CT slices");
+    // In the folder of the slices, one of which is missing.
+    write_slices("flat", "1.2.3.5", 0);
+    std::filesystem::remove(folder_ / "flat/s7");
+    folder_.write("flat/segmentation.nii", testing::nifti_bytes(volume_));
+    const auto flat = contents_of(folder_ / "flat");
+    ASSERT_TRUE(flat) << flat.error().message();
+    EXPECT_EQ(flat->labels, folder_ / "flat/segmentation.nii");
+    EXPECT_EQ(flat->scan, folder_ / "flat");
+    EXPECT_EQ(flat->scan_kind, "15 CT slices");
+    // Beside a segmentation: the stack that it lies in, and its count.
+    write_slices("two/abdomen", "1.2.3.5", 1);
+    write("two/seg.dcm");
+    volume_.origin.z += 200;
+    write_slices("two/thorax", "1.2.3.6", 0);
+    volume_.origin.z -= 200;
+    const auto two = contents_of(folder_ / "two");
+    ASSERT_TRUE(two) << two.error().message();
+    EXPECT_EQ(two->scan_kind, "15 CT slices");
+    ASSERT_EQ(two->left_out.size(), 1u);
+    EXPECT_EQ(two->left_out[0], "16 x CT from s0, another series");
+    EXPECT_EQ(two->shear_deg, 0);
+    // A tilted gantry is said before anything is read.
+    volume_.columns(1, 2) = 0.53;
+    write_slices("tilt", "1.2.3.5", 0);
+    const auto tilt = contents_of(folder_ / "tilt");
+    ASSERT_TRUE(tilt) << tilt.error().message();
+    EXPECT_NEAR(tilt->shear_deg, 10, 0.1);
 }
 
 TEST_F(DicomSegmentation, ThatIsDamagedIsRefused) {
@@ -332,7 +457,8 @@ TEST_F(DicomSegmentation, OfContoursOrReportsIsRefusedByName) {
     ASSERT_TRUE(beside) << beside.error().message();
     EXPECT_EQ(beside->labels.grid.size, volume_.size);
     ASSERT_FALSE(beside->report.warnings.empty());
-    EXPECT_NE(beside->report.warnings[0].find("the contours of rtss.dcm (RTSTRUCT) are not read"),
+    EXPECT_NE(beside->report.warnings[0].find(
+                  "the contours of the structure set (RTSTRUCT) are not read"),
               std::string::npos)
         << beside->report.warnings[0];
     object_.modality = "PT";
@@ -343,7 +469,7 @@ TEST_F(DicomSegmentation, OfContoursOrReportsIsRefusedByName) {
         folder_.write("pet/s" + std::to_string(k), testing::dicom_slice(volume_, k, "1.2.3.5"));
     const auto result = import_label_map(folder_ / "pet");
     ASSERT_TRUE(result) << result.error().message();
-    EXPECT_TRUE(warns(result, "left out of the DICOM folder: 1 PT (a.dcm)"));
+    EXPECT_TRUE(warns(result, "left out of the DICOM folder: 1 PT"));
 }
 
 // GDCM reads beyond the end of such frames.

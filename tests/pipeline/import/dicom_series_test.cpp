@@ -68,9 +68,21 @@ TEST_F(DicomFolder, IsReadInAnyFileOrder) {
 // Who is in the scan stays in the scan: neither the map nor the report repeats it.
 TEST_F(DicomFolder, ThatNamesItsPatientLeavesNoTraceOfTheName) {
     declared_.person = "DOE^JANE";
-    write_all();
-    const auto result = imported();
+    declared_.description = "Abdomen DOE";
+    const std::string place = "DOE JANE/CT DOE/";
+    const auto write_to = [&](const std::string& series, int k) {
+        folder_.write(place + series + " DOE " + name_of(k),
+                      testing::dicom_slice(volume_, k, series, declared_));
+    };
+    for (int k = 0; k < volume_.size.z; ++k) write_to("1.2.3.5", k);
+    write_to("1.2.3.6", 7);
+    testing::TinyObject report;
+    report.kind = "CT";
+    report.modality = "PR";
+    folder_.write(place + "DOE.dcm", testing::dicom_object(volume_, report));
+    const auto result = import_label_map(folder_ / "DOE JANE");
     ASSERT_TRUE(result) << result.error().message();
+    EXPECT_GE(result->report.warnings.size(), 2u);  // of the other series, of what is left out
     std::string told;
     for (const std::string& warning : result->report.warnings) told += warning;
     for (const Note& note : result->report.notes) told += note.name + note.text;
@@ -109,14 +121,24 @@ TEST_F(DicomFolder, WithASliceMissingIsRefused) {
 
 TEST_F(DicomFolder, WithASliceTwiceIsRefused) {
     write_all();
+    declared_.instance = "1.2.3.5.99";
+    write("z-copy.dcm", 7);
+    expect_refused("z-copy.dcm", "there twice, in s0007.dcm");
+    // Labels of one identity that differ: which are they?
+    declared_.instance = "1.2.3.5.8";
+    volume_.voxels.assign(volume_.voxels.size(), kLiver);
     write("z-copy.dcm", 7);
     expect_refused("z-copy.dcm", "there twice, in s0007.dcm");
 }
 
-TEST_F(DicomFolder, WithEverySliceTwiceIsRefused) {
+TEST_F(DicomFolder, WithCopiesOfFilesIsReadOnceWithAWarning) {
     write_all();
     for (int k = 0; k < volume_.size.z; ++k) write("z" + name_of(k), k);
-    expect_refused("s0000.dcm", "there twice");
+    const auto result = imported();
+    ASSERT_TRUE(result) << result.error().message();
+    EXPECT_EQ(result->labels.grid.size, volume_.size);
+    ASSERT_FALSE(result->report.warnings.empty());
+    EXPECT_EQ(result->report.warnings[0], "16 DICOM slices are there twice: the copy was left out");
 }
 
 TEST_F(DicomFolder, WithASliceOfAnotherSeriesInPlaceOfItsOwnIsRefused) {
@@ -132,7 +154,7 @@ TEST_F(DicomFolder, WithASliceOfAnotherSeriesBesideItsOwnIsReadWithAWarning) {
     ASSERT_TRUE(result) << result.error().message();
     ASSERT_FALSE(result->report.warnings.empty());
     EXPECT_NE(result->report.warnings[0].find("2 DICOM series"), std::string::npos);
-    EXPECT_NE(result->report.warnings[0].find("not 1 x CT from other.dcm"), std::string::npos);
+    EXPECT_NE(result->report.warnings[0].find("not 1 x CT: to take another"), std::string::npos);
     EXPECT_EQ(result->labels.grid.size.z, volume_.size.z);
 }
 
@@ -275,6 +297,136 @@ TEST_F(DicomFolder, WhoseSlicesAreThinnerThanTheyLieApartIsReadWithAWarning) {
               std::string::npos);
 }
 
+// What is harmless in a scan, which fills in the body: said, and read.
+class DicomScan : public DicomFolder {
+  protected:
+    DicomScan() {
+        declared_.is_signed = true;
+        for (std::size_t n = 0; n < volume_.voxels.size(); ++n)
+            declared_.values.push_back(static_cast<std::int16_t>(
+                volume_.voxels[n] == 0 ? -1000 : 10 * static_cast<int>(n / slice())));
+    }
+    std::size_t slice() const {
+        return static_cast<std::size_t>(volume_.size.x) * static_cast<std::size_t>(volume_.size.y);
+    }
+    // The scan, which warns in these words.
+    ScanVolume scan(const std::string& words, const std::string& name = "series") const {
+        const auto read = read_scan(folder_ / name);
+        EXPECT_TRUE(read) << read.error().message();
+        if (!read) return {};
+        std::string all;
+        for (const std::string& warning : read->warnings) all += warning + "\n";
+        EXPECT_NE(all.find(words), std::string::npos) << all;
+        EXPECT_EQ(all.find(".dcm"), std::string::npos) << all;
+        return *read;
+    }
+};
+
+TEST_F(DicomScan, OfTwoPhasesIsTheFirstOrThatOfTheLabels) {
+    const auto bright = [&](int by) {
+        auto phase = declared_;
+        for (std::int16_t& value : phase.values) value = static_cast<std::int16_t>(value + by);
+        return phase;
+    };
+    for (const std::string tag : {"acquisition", "moment", "numbers"}) {
+        SCOPED_TRACE(tag);
+        std::filesystem::remove_all(folder_ / "series");
+        for (const int phase : {2, 1}) {
+            auto of_phase = bright(phase == 2 ? 100 : 0);
+            if (tag == "acquisition") of_phase.acquisition = std::to_string(phase);
+            if (tag == "moment") of_phase.moment = std::to_string(phase);
+            for (int k = 0; k < volume_.size.z; ++k) {
+                of_phase.instance = "1.2.3." + std::to_string(1000 * phase + k);
+                folder_.write("series/" + std::to_string(phase) + name_of(k),
+                              testing::dicom_slice(volume_, k, "1.2.3.5", of_phase));
+            }
+        }
+        const ScanVolume first = scan("2 phases in one place");
+        EXPECT_EQ(first.grid.size, volume_.size);
+        EXPECT_EQ(first.values, declared_.values);
+    }
+    EXPECT_FALSE(imported().has_value());  // labels are not several
+}
+
+TEST_F(DicomScan, WithAScoutAmongItsSlicesIsReadWithoutIt) {
+    write_all();
+    TinyVolume turned = volume_;
+    turned.columns(0, 0) = 0;
+    turned.columns(2, 0) = 2;
+    declared_.instance = "1.2.3.5.99";
+    folder_.write("series/a.dcm", testing::dicom_slice(turned, 0, "1.2.3.5", declared_));
+    EXPECT_EQ(scan("1 slice of the scan is turned").values, declared_.values);
+}
+
+TEST_F(DicomScan, WithASliceMissingHasTheMeanOfItsNeighbours) {
+    write_all();
+    remove(7);
+    EXPECT_EQ(scan("1 slice of the scan is missing").values, declared_.values);
+    remove(8);
+    const auto two = read_scan(folder_ / "series");
+    ASSERT_FALSE(two);
+    EXPECT_NE(two.error().message().find("2 slices are missing"), std::string::npos);
+}
+
+TEST_F(DicomScan, CompressedWithLossIsReadWithAWarning) {
+    declared_.lossy = true;
+    write_all();
+    EXPECT_EQ(scan("compressed with loss").values, declared_.values);
+    expect_refused("s0000.dcm", "compressed with loss");
+}
+
+TEST_F(DicomScan, HasAirWhereItIsPadded) {
+    declared_.padding = {-3024, -2000};
+    declared_.values[0] = -3024;
+    declared_.values[1] = -2500;
+    declared_.values[2] = -2000;
+    declared_.values[3] = -1999;
+    write_all();
+    auto expected = declared_.values;
+    expected[0] = expected[1] = expected[2] = -1000;
+    EXPECT_EQ(scan("").values, expected);
+    // Of unsigned numbers, as -2000 in 16 bits.
+    declared_.is_signed = false;
+    declared_.padding = {63536};
+    declared_.values.assign(volume_.voxels.size(), 40);
+    declared_.values[5] = static_cast<std::int16_t>(63536);
+    write_all();
+    expected.assign(volume_.voxels.size(), 40);
+    expected[5] = 0;  // the least that such numbers hold
+    EXPECT_EQ(scan("").values, expected);
+}
+
+// A thorax of more slices than the abdomen that was segmented.
+TEST_F(DicomScan, OfTwoSeriesIsThatInWhichTheSegmentationLies) {
+    TinyVolume above = volume_;
+    above.origin.z += 200;
+    for (int k = 0; k < volume_.size.z; ++k) {
+        write(name_of(k), k, "1.2.3.6");
+        if (k > 0) write("t" + name_of(k), k, "1.2.3.5");
+    }
+    for (int k = 0; k < volume_.size.z; ++k)
+        folder_.write("series/" + name_of(k), testing::dicom_slice(above, k, "1.2.3.6", declared_));
+    EXPECT_EQ(scan("the one with the most slices was taken (16 x CT), and not 15 x CT").grid.size.z,
+              16);
+    testing::TinyObject labels;
+    labels.segments = {{1, "liver", {kLiver}, ""}, {2, "spleen", {kSpleen}, ""}};
+    labels.between_mm = kSpacing.z;
+    folder_.write("series/seg.dcm", testing::dicom_object(volume_, labels));
+    const ScanVolume taken =
+        scan("the one that the segmentation lies in was taken (15 x CT), and not 16 x CT");
+    EXPECT_EQ(taken.grid.size.z, 15);
+    EXPECT_LT(taken.grid.origin_mm.z, 350);
+    // An error lists the series.
+    std::filesystem::remove(folder_ / "series/ts0007.dcm");
+    std::filesystem::remove(folder_ / "series/ts0008.dcm");
+    const auto faulty = read_scan(folder_ / "series");
+    ASSERT_FALSE(faulty);
+    EXPECT_NE(faulty.error().message().find("(of 2 series: 13 x CT from ts0001.dcm; 16 x CT from "
+                                            "s0000.dcm)"),
+              std::string::npos)
+        << faulty.error().message();
+}
+
 // Like a large clinical export: 3,000 slices, one wrong. Reading the headers takes about a second.
 TEST_F(DicomFolder, OfThreeThousandSlicesNamesTheOneThatIsWrong) {
     volume_ = testing::sample_in_order({0, 1, 2}, {false, false, false}, {96, 64, 300},
@@ -285,7 +437,9 @@ TEST_F(DicomFolder, OfThreeThousandSlicesNamesTheOneThatIsWrong) {
     const auto whole = imported();
     ASSERT_TRUE(whole) << whole.error().message();
     EXPECT_EQ(whole->labels.grid.size.z, 3000);
+    declared_.instance = "1.2.3.5.9999";
     write("t1500.dcm", 1500);
+    declared_.instance = "";
     expect_refused("t1500.dcm", "there twice, in s1500.dcm");
     std::filesystem::remove(folder_ / "series/t1500.dcm");
     remove(1500);

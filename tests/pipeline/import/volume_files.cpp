@@ -270,7 +270,8 @@ std::string dicom_slice(const TinyVolume& volume,
                         int k,
                         const std::string& series,
                         const DicomCounts& counts) {
-    const std::string instance = series + "." + std::to_string(k + 1);
+    const std::string instance =
+        !counts.instance.empty() ? counts.instance : series + "." + std::to_string(k + 1);
     const std::string ct = "1.2.840.10008.5.1.4.1.1.2";
     std::string bytes = dicom_head(ct, instance);
     const Vector3 x = volume.columns.column(0), y = volume.columns.column(1);
@@ -280,8 +281,11 @@ std::string dicom_slice(const TinyVolume& volume,
     bytes += element(8, 0x16, "UI", ct) + element(8, 0x18, "UI", instance) +
              element(8, 0x60, "CS", "CT");
     if (!counts.person.empty()) {
-        for (const int number : {0x80, 0x1030, 0x103e})  // institution, study, series
+        for (const int number : {0x80, 0x1030})  // institution, study
             bytes += element(8, static_cast<std::uint16_t>(number), "LO", counts.person);
+    }
+    if (!counts.description.empty()) bytes += element(8, 0x103e, "LO", counts.description);
+    if (!counts.person.empty()) {
         bytes += element(0x10, 0x10, "PN", counts.person) +
                  element(0x10, 0x20, "LO", counts.person) +
                  element(0x10, 0x4000, "LT", counts.person);
@@ -290,6 +294,7 @@ std::string dicom_slice(const TinyVolume& volume,
                      !counts.thickness.empty() ? counts.thickness
                                                : numbers({norm(volume.columns.column(2))}, ""));
     bytes += element(0x20, 0xd, "UI", "1.2.3.9") + element(0x20, 0xe, "UI", series);
+    if (!counts.acquisition.empty()) bytes += element(0x20, 0x12, "IS", counts.acquisition);
     bytes += element(0x20, 0x13, "IS", std::to_string(k + 1));
     bytes +=
         element(0x20, 0x32, "DS",
@@ -297,6 +302,7 @@ std::string dicom_slice(const TinyVolume& volume,
     bytes += orientation(volume);
     if (!counts.frame_of_reference.empty())
         bytes += element(0x20, 0x52, "UI", counts.frame_of_reference);
+    if (!counts.moment.empty()) bytes += element(0x20, 0x100, "IS", counts.moment);
     if (counts.in_acquisition > 0)
         bytes += element(0x20, 0x1002, "IS", std::to_string(counts.in_acquisition));
     if (counts.in_series > 0)
@@ -309,6 +315,10 @@ std::string dicom_slice(const TinyVolume& volume,
     bytes += element(0x28, 0x100, "US", us(16)) + element(0x28, 0x101, "US", us(stored)) +
              element(0x28, 0x102, "US", us(static_cast<std::uint16_t>(stored - 1))) +
              element(0x28, 0x103, "US", us(counts.is_signed ? 1 : 0));
+    for (std::size_t n = 0; n < counts.padding.size(); ++n)
+        bytes += element(0x28, static_cast<std::uint16_t>(0x120 + n), "US",
+                         us(static_cast<std::uint16_t>(counts.padding[n])));
+    if (counts.lossy) bytes += element(0x28, 0x2110, "CS", "01");
     std::string pixels;
     const std::size_t slice = static_cast<std::size_t>(volume.size.x) * volume.size.y;
     const auto unused = static_cast<std::uint16_t>(0xffff << stored);
@@ -443,10 +453,15 @@ std::string dicom_object(const TinyVolume& volume, const TinyObject& object) {
                 element(0x62, 4, "US", us(static_cast<std::uint16_t>(segment.number))) +
                 element(0x62, 5, "LO", segment.label);
             if (!segment.meaning.empty())
-                content +=
-                    sequence(0x62, 0xf,
-                             element(8, 0x100, "SH", "10200004") + element(8, 0x102, "SH", "SCT") +
-                                 element(8, 0x104, "LO", segment.meaning));
+                content += sequence(
+                    0x62, 0xf,
+                    element(8, 0x100, "SH", segment.code) + element(8, 0x102, "SH", "SCT") +
+                        element(8, 0x104, "LO", segment.meaning) +
+                        (segment.side.empty() ? std::string()
+                                              : sequence(0x62, 0x11,
+                                                         element(8, 0x100, "SH", segment.side) +
+                                                             element(8, 0x102, "SH", "SCT") +
+                                                             element(8, 0x104, "LO", "Seite"))));
             segments += item(content);
         }
         bytes += element(0x62, 2, "SQ", segments);

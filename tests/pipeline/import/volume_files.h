@@ -59,6 +59,9 @@ struct DicomCounts {
     std::vector<std::int16_t> values = {};  // of all voxels, instead of the volume's own
     std::string person;  // in every element that names or describes the patient; empty: none
     std::string frame_of_reference;
+    std::string instance, acquisition, moment, description;  // empty: its own, none, ...
+    bool lossy = false;
+    std::vector<int> padding = {};  // value, and limit where there are two
 };
 // One slice of an uncompressed DICOM series of unsigned 16-bit values, explicit little-endian.
 std::string dicom_slice(const TinyVolume& volume,
@@ -70,8 +73,9 @@ std::string dicom_slice(const TinyVolume& volume,
 struct TinySegment {
     int number = 1;
     std::string label;
-    std::vector<int> values;  // of the volume that are inside
-    std::string meaning;      // of its type's code; empty: none
+    std::vector<int> values;                   // of the volume that are inside
+    std::string meaning;                       // of its type's code; empty: none
+    std::string code = "10200004", side = {};  // SNOMED CT: of the type, and of its modifier
 };
 struct TinyObject {
     std::string kind = "BINARY";  // FRACTIONAL, LABELMAP, or CT: its pixels are the values

@@ -70,7 +70,8 @@ struct Study {
     std::function<bool(const std::string& name)> drawn = [](const std::string&) { return true; };
     bool with_scan = true;
     std::string patient_of_labels = "1", patient_of_scan = "1";
-    int offset = 0;  // of the scan's values
+    int offset = 0;       // of the scan's values
+    double slide_mm = 0;  // from slice to slice of the scan: a tilted gantry
 
     void write(const TemporaryFolder& folder, const std::string& name) const {
         const TinyVolume volume = tiny(labels);
@@ -81,9 +82,11 @@ struct Study {
         for (const std::uint8_t voxel : labels.voxels)
             counts.values.push_back(
                 static_cast<std::int16_t>(hounsfield(labels.labels[voxel]) + offset));
+        TinyVolume tilted = volume;
+        tilted.columns(1, 2) = slide_mm;
         for (int k = 0; with_scan && k < volume.size.z; ++k)
             folder.write(name + "/ct/" + std::to_string(100 + k) + ".dcm",
-                         dicom_slice(volume, k, "1.2.3.5", counts));
+                         dicom_slice(tilted, k, "1.2.3.5", counts));
         TinyObject object;
         object.kind = "BINARY";
         object.segments = segments_of(labels, drawn);
@@ -348,10 +351,21 @@ TEST_F(MakeCase, an_earlier_examination_beside_the_one_that_was_segmented) {
 // What is written here lies behind links in the case's folder; the author knows his own paths.
 TEST_F(MakeCase, a_lost_slice_is_named_where_it_lies) {
     Study{}.write(folder_, "disc");
-    std::filesystem::remove(folder_ / "disc/ct/120.dcm");
+    for (const char* name : {"disc/ct/120.dcm", "disc/ct/121.dcm"})
+        std::filesystem::remove(folder_ / name);
     const Outcome outcome = make("disc");
     expect_sentence(outcome, "missing between");
     EXPECT_NE(outcome.sentence.find(folder_ / "disc/ct/1"), std::string::npos) << outcome.sentence;
+}
+
+// What `import` refuses without --resample-shear, `make` does and says.
+TEST_F(MakeCase, slices_of_a_tilted_gantry_are_moved) {
+    Study{.drawn = is_organ, .slide_mm = 0.1}.write(folder_, "disc");
+    const Outcome outcome = make("disc", "case", true);
+    EXPECT_TRUE(outcome.made) << outcome.sentence;
+    EXPECT_TRUE(outcome.decided("slices of a tilted gantry (1.15 degrees)"));
+    EXPECT_NE(read_text(folder_ / "case/case.toml").find("\nresample_shear = true\n"),
+              std::string::npos);
 }
 
 TEST_F(MakeCase, names_of_another_language) {

@@ -344,6 +344,21 @@ TEST(CommandLine, NewFolderOfAnOutputFileIsNamedBeforeTheWork) {
     EXPECT_EQ(old_folder.error, "");
 }
 
+// The advice on slanted axes names the verbs that have the option, and the key of the others.
+TEST(CommandLine, OptionsThatErrorsNameExist) {
+    const TemporaryFolder folder;
+    for (const char* verb : {"import", "make", "register"})
+        EXPECT_NE(sonocase_run(std::string(verb) + " --help", folder).out.find("--resample-shear"),
+                  std::string::npos)
+            << verb;
+    folder.write("case.toml",
+                 "name = \"x\"\n[inputs]\nlabels = \"no.nii\"\nown_skin = true\n"
+                 "resample_shear = true\n");
+    const std::string error =
+        sonocase_run("build case.toml --until import --cache c", folder).error;
+    EXPECT_NE(error.find("no.nii"), std::string::npos) << error;  // the file, and not the key
+}
+
 // Every option of a stage is a flag of its verb; a switch takes true or false as in a recipe.
 TEST(CommandLine, OptionsOfAStageAreFlagsOfItsVerb) {
     const TemporaryFolder folder;
