@@ -31,7 +31,7 @@ export function when_store_opens(what) { on_late = what; }
 
 function open_database() {
     opening ??= new Promise((done) => {
-        let late = false, timer = 0;
+        let late = false, timer = 0, again = 1;
         const give_up = () => {
             late = true;
             done(null);
@@ -52,6 +52,7 @@ function open_database() {
             asked.onerror = () => {
                 // A newer page was here: what it has is opened as it is.
                 if (asked.error?.name === 'VersionError' && version) ask(undefined);
+                else if (again-- > 0) setTimeout(ask, 200, version);  // site data is just being cleared, perhaps
                 else give_up();
             };
             asked.onsuccess = () => {

@@ -318,6 +318,7 @@ await run_tests({
             }
         }
         expect_equal(await text(page, 'module-begin'), 'Üben', 'German');
+        await page.until('sonoplay.app.course.platform.waiting() === 0');
         expect_equal(platform.verbs().join(), 'initialized', 'one session');
         expect_equal(platform.faults.join('\n'), '', 'rules of cmi5');
         // The learner's own choice on this page goes first.
