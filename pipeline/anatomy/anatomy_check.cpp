@@ -778,6 +778,8 @@ class Check {
         f.axis = best_.axis;
         f.factor = best_.factor;
         f.margin = best_.score - right_.score;
+        for (std::size_t i = 0; i < best_.names.size() && i < names_.size(); ++i)
+            f.renamed += best_.names[i] != nullptr && best_.names[i] != names_[i];
         const std::string turn =
             options_.mesh
                 ? "; give --axes lps or ras if the file holds one of them, else turn it in the "

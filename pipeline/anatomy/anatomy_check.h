@@ -79,6 +79,7 @@ struct AnatomyFinding {
     bool error = false;  // no human body fits
     int axis = -1;       // of `spacing`
     double factor = 1;   // of `unit` and `spacing`: measured by expected
+    int renamed = 0;     // labels that it gives other names: of `names_...`
     double margin = 0;   // natural logarithm of how much likelier it is than "the map is right"
     std::string text;    // a sentence with the likely cause and what to do
 };

@@ -428,8 +428,53 @@ Result<LabelTable> parse_label_xml(std::string_view xml, const std::string& wher
     return table;
 }
 
+namespace {
+
+// [{"labels": [{"name": "liver", "value": 1, "color": {"value": [1, 0, 0]}}]}]: the groups of
+// MITK, each of them a layer.
+Result<LabelTable> table_of_mitk(const std::string& text, const std::string& where) {
+    const Error damaged{"MITK's label groups in the header are damaged", where,
+                        "save the segmentation again, or give a table as CSV"};
+    detail::JsonFault fault;
+    fault.where = where;
+    detail::Json root;
+    if (!detail::parse_json("{\"groups\":" + text + "}", root, fault)) return damaged;
+    LabelTable table;
+    int layer = 0;
+    for (const detail::Json& group : root["groups"]) {
+        if (!group.is_object()) return damaged;
+        const auto labels = group.find("labels");
+        if (labels == group.end() || !labels->is_array()) return damaged;
+        for (const detail::Json& label : *labels) {
+            if (!label.is_object()) return damaged;
+            const auto name = label.find("name"), value = label.find("value");
+            if (name == label.end() || !name->is_string() || value == label.end() ||
+                !value->is_number_integer() || std::abs(value->get<double>()) > 2147483647.0)
+                return damaged;
+            LabelTableEntry entry{value->get<int>(), name->get<std::string>(), {}, {}, layer};
+            const auto colour = label.find("color");
+            if (colour != label.end() && colour->is_object() && colour->contains("value")) {
+                const detail::Json& rgb = (*colour)["value"];
+                if (rgb.is_array() && rgb.size() >= 3 && rgb[0].is_number() && rgb[1].is_number() &&
+                    rgb[2].is_number())
+                    entry.colour = {colour_byte(rgb[0].get<double>(), true),
+                                    colour_byte(rgb[1].get<double>(), true),
+                                    colour_byte(rgb[2].get<double>(), true)};
+            }
+            table.push_back(std::move(entry));
+        }
+        ++layer;
+    }
+    return table;
+}
+
+}  // namespace
+
 Result<LabelTable> segments_of_fields(const std::map<std::string, std::string>& fields,
                                       const std::string& where) {
+    if (const auto mitk = fields.find("org.mitk.multilabel.segmentation.labelgroups");
+        mitk != fields.end())
+        return table_of_mitk(mitk->second, where);
     // The numbers of all keys "Segment<N>_...": writers other than Slicer begin at 1, or leave
     // gaps.
     std::map<std::string, int> prefixes;  // "Segment12_" and 12

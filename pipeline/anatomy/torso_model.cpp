@@ -6,6 +6,7 @@
 #include <cctype>
 #include <map>
 
+#include "pipeline/anatomy/tissue_table.h"
 #include "pipeline/base/text.h"
 
 namespace sonocase::pipeline::inline anatomy {
@@ -309,7 +310,11 @@ std::span<const ModelStructure> torso_model() {
     return model().structures;
 }
 
-int model_structure(std::string_view name) {
+namespace {
+
+// What a name means in a map by words without gaps; of a pair with ":r" or ":l" behind them.
+template <class Map>
+typename Map::const_iterator find_by_words(const Map& by_name, std::string_view name) {
     std::vector<std::string> words = words_of(name);
     const auto take_side = [&](std::initializer_list<const char*> sides) {
         const auto found = std::find_if(words.begin(), words.end(), [&](const std::string& word) {
@@ -319,15 +324,38 @@ int model_structure(std::string_view name) {
         words.erase(found);
         return true;
     };
-    if (const auto whole = model().by_name.find(joined(words)); whole != model().by_name.end())
-        return whole->second;
+    if (const auto whole = by_name.find(joined(words)); whole != by_name.end()) return whole;
     std::string side;
     if (take_side({"right", "r", "rt"}))
         side = ":r";
     else if (take_side({"left", "l", "lt"}))
         side = ":l";
-    const auto found = model().by_name.find(joined(words) + side);
+    return by_name.find(joined(words) + side);
+}
+
+std::map<std::string, std::string, std::less<>> make_standard_names() {
+    std::map<std::string, std::string, std::less<>> names;
+    for (const std::string_view name : total_segmentator_labels()) {
+        std::vector<std::string> words = words_of(name);
+        std::string side;
+        for (const auto& [word, end] : {std::pair{"right", ":r"}, {"left", ":l"}})
+            if (std::erase(words, word) > 0) side = end;
+        names[joined(words) + side] = std::string(name);
+    }
+    return names;
+}
+
+}  // namespace
+
+int model_structure(std::string_view name) {
+    const auto found = find_by_words(model().by_name, name);
     return found == model().by_name.end() ? -1 : found->second;
+}
+
+std::string standard_name(std::string_view name) {
+    static const auto names = make_standard_names();
+    const auto found = find_by_words(names, name);
+    return found == names.end() ? "" : found->second;
 }
 
 bool is_body_name(std::string_view name) {

@@ -35,6 +35,11 @@ std::span<const ModelStructure> torso_model();
 // "vertebrae_L5". -1: none.
 int model_structure(std::string_view name);
 
+// The name of TotalSegmentator v2 "total" that a name spells otherwise: "Liver", "right kidney",
+// "Kidney-RT" and "Adrenal gland (L)" have one. No synonyms: "hepar" and "ileum" have none. Empty:
+// none.
+std::string standard_name(std::string_view name);
+
 // A label of the whole body or its skin, whose box is the body's.
 bool is_body_name(std::string_view name);
 

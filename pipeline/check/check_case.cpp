@@ -15,6 +15,7 @@
 #include "formats/text/nearest_name.h"
 #include "pipeline/anatomy/anatomy_check.h"
 #include "pipeline/anatomy/tissue_table.h"
+#include "pipeline/anatomy/torso_model.h"
 #include "pipeline/base/parallel.h"
 #include "pipeline/base/text.h"
 #include "pipeline/check/aim.h"
@@ -89,8 +90,11 @@ class Anatomy {
         return sums_.count[label] * bundle_.grid.voxel_volume_mm3() / 1000;
     }
     bool has(const std::string& name) const {
-        const int label = labels_.find(name);
-        return label > 0 && sums_.count[label] > 0;
+        for (std::size_t l = 1; l < bundle_.labels.size(); ++l) {
+            const std::string& label = bundle_.labels[l].name;
+            if (sums_.count[l] > 0 && (label == name || standard_name(label) == name)) return true;
+        }
+        return false;
     }
     std::optional<Vector3> middle(const std::vector<std::string>& words) const {
         Vector3 sum;

@@ -14,7 +14,7 @@
 #include "formats/files/load_save.h"
 #include "formats/files/thread_jobs.h"
 #include "formats/text/excerpt.h"
-#include "pipeline/anatomy/anatomy_check.h"
+#include "pipeline/anatomy/torso_model.h"
 #include "pipeline/base/text.h"
 #include "pipeline/check/check_case.h"
 #include "pipeline/check/propose_exercises.h"
@@ -77,13 +77,12 @@ double covered_share(const LabelVolume& labels) {
     return faces == 0 ? 0 : static_cast<double>(covered) / static_cast<double>(faces);
 }
 
-// Names that no structure here has. What the scan fills in counts as
-// none.
+// Names that exercises do not know. What the scan fills in counts as none.
 std::string unknown_names(const std::vector<Label>& labels) {
     std::vector<std::string> names;
     for (const Label& label : labels) {
-        if (label.tissue == "outside" || is_known_structure(label.name) || label.name == "skin" ||
-            label.name == "gas_in_body" || label.name.starts_with("other_"))
+        if (label.tissue == "outside" || standard_name(label.name) == label.name ||
+            label.name == "skin" || label.name == "gas_in_body" || label.name.starts_with("other_"))
             continue;
         names.push_back("'" + label.name + "'");
     }
@@ -107,9 +106,11 @@ class Maker {
         made_.folder = folder_.path();
     }
 
-    Result<MadeCase> run() {
+    // warnings: gets those of a case that could not be made.
+    Result<MadeCase> run(std::vector<std::string>& warnings) {
         auto made = make();
         if (made) return made;
+        warnings = std::move(made_.warnings);
         Error error = made.error();
         error.where = folder_.given(error.where);
         return error;
@@ -159,11 +160,22 @@ class Maker {
         cook.producer = options_.producer;
         cook.until = until;
         SONOCASE_TRY(auto cooked, cook_case(recipe, cook, between(progress_, from, to)));
-        for (const StageRun& run : cooked.stages)
+        for (const StageRun& run : cooked.stages) {
+            add_warnings(run.report);
             if (!run.from_cache && std::find(made_.cooked.begin(), made_.cooked.end(),
                                              run.report.stage) == made_.cooked.end())
                 made_.cooked.push_back(run.report.stage);
+        }
         return cooked;
+    }
+
+    void add_warnings(const StageReport& report) {
+        for (const std::string& warning : report.warnings) {
+            std::string whole = report.stage + ": " + warning;
+            if (std::find(made_.warnings.begin(), made_.warnings.end(), whole) ==
+                made_.warnings.end())
+                made_.warnings.push_back(std::move(whole));
+        }
     }
 
     // What cannot become a case is told before the work: names that no exercise knows, or organs
@@ -177,8 +189,12 @@ class Maker {
         StageRunner runner(recipe, plan, {folder_.file("cache"), 0, stage_names::kImport},
                            progress);
         SONOCASE_TRY_DONE(runner.run());
-        for (const StageRun& run : runner.runs)
+        for (const StageRun& run : runner.runs) {
             if (!run.from_cache) made_.cooked.push_back(run.report.stage);
+            add_warnings(run.report);
+            for (const Note& note : run.report.notes)
+                if (note.name == "renamed") decided_({"names: " + note.text, "--table FILE"});
+        }
         const StageValue imported = runner.result();
         const LabelVolume& labels = imported.as(kCtLabels).volume;
         if (const std::string why = why_none_fits(labels.labels);
@@ -254,9 +270,6 @@ class Maker {
             if (digest && *digest == folder_.key("bundle digest")) return Done{};
         }
         SONOCASE_TRY(auto cooked, cook(recipe, kCookAgainAt, kCheckAt));
-        for (const StageRun& run : cooked.stages)
-            for (const std::string& warning : run.report.warnings)
-                made_.warnings.push_back(run.report.stage + ": " + warning);
         ThreadJobs jobs;
         const std::vector<std::uint8_t> bytes = write_bundle(cooked.bundle, jobs);
         SONOCASE_TRY_DONE(write_file(options_.out, std::span<const std::uint8_t>(bytes)));
@@ -355,11 +368,16 @@ class Maker {
 
 Result<MadeCase> make_case(const MakeOptions& options,
                            const Decided& decided,
-                           const Progress& progress) {
+                           const Progress& progress,
+                           std::vector<std::string>* warnings) {
     report_progress(progress, 0, "looking at the inputs");
     SONOCASE_TRY(auto found, find_inputs(options, decided));
     SONOCASE_TRY(auto folder, CaseFolder::open(options.out));
-    return Maker(options, decided, std::move(found), std::move(folder), progress).run();
+    std::vector<std::string> of_failure;
+    auto made =
+        Maker(options, decided, std::move(found), std::move(folder), progress).run(of_failure);
+    if (warnings != nullptr) *warnings = std::move(of_failure);
+    return made;
 }
 
 }  // namespace sonocase::pipeline::inline make

@@ -60,9 +60,10 @@ struct MadeCase {
 // Errors besides those of the stages: no labels, or several maps; labels of organs alone without a
 // scan; an anatomy that supports no exercise where the author has written none; faults that the
 // check finds, unless they are accepted: the bundle and its check are written then, and not
-// published.
+// published. warnings: gets those of the stages where no case is made.
 Result<MadeCase> make_case(const MakeOptions& options,
                            const std::function<void(const Decision&)>& decided,
-                           const Progress& progress = {});
+                           const Progress& progress = {},
+                           std::vector<std::string>* warnings = nullptr);
 
 }  // namespace sonocase::pipeline::inline make

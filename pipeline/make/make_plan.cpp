@@ -11,6 +11,7 @@
 #include "formats/files/atomic_file.h"
 #include "pipeline/anatomy/label_table.h"
 #include "pipeline/base/text.h"
+#include "pipeline/import/volume/label_map.h"
 #include "pipeline/import/volume/source_contents.h"
 #include "pipeline/import/volume/volume_file.h"
 
@@ -39,19 +40,40 @@ std::string quoted(const std::string& text) {
     return out + "\"";
 }
 
-// A CSV beside a label map that names its values.
-std::string table_beside(const std::string& labels) {
+bool lies_in(const fs::path& inner, const fs::path& outer) {
+    const fs::path way = inner.lexically_relative(outer);
+    return !way.empty() && *way.begin() != "..";
+}
+
+fs::path folder_of_case(const std::string& out) {
+    return fs::path(out).parent_path() / fs::path(out).stem();
+}
+
+// A case written among its inputs would be read as one of them the next time.
+Status check_apart(const MakeOptions& options) {
     std::error_code code;
-    if (!is_volume_file_name(labels)) return "";
-    const std::string side =
-        (fs::path(labels).parent_path() / (volume_stem(labels) + ".csv")).string();
-    if (!fs::is_regular_file(side, code) || !load_label_table(side)) return "";
-    return side;
+    const fs::path folder = fs::weakly_canonical(fs::absolute(folder_of_case(options.out)), code);
+    std::vector<std::string> inputs = options.inputs;
+    if (!options.scan.empty()) inputs.push_back(options.scan);
+    for (const std::string& input : inputs) {
+        fs::path path = fs::weakly_canonical(fs::absolute(input), code);
+        if (!path.has_filename()) path = path.parent_path();
+        const char* how = folder == path          ? "is"
+                          : lies_in(folder, path) ? "lies in"
+                          : lies_in(path, folder) ? "holds"
+                                                  : nullptr;
+        if (how != nullptr)
+            return Error{std::string("the case's folder ") + how + " the input " + name_of(input),
+                         folder_of_case(options.out).string(),
+                         "give -o elsewhere, outside of all inputs"};
+    }
+    return Done{};
 }
 
 }  // namespace
 
 Result<FoundInputs> find_inputs(const MakeOptions& options, const Decided& decided) {
+    SONOCASE_TRY_DONE(check_apart(options));
     FoundInputs found;
     found.resample_shear = options.resample_shear;
     std::string kind;
@@ -93,6 +115,10 @@ Result<FoundInputs> find_inputs(const MakeOptions& options, const Decided& decid
     found.table = options.table;
     if (found.table.empty()) {
         found.table = table_beside(found.labels);
+        if (!found.table.empty() && !load_label_table(found.table)) {
+            decided({"left out: " + name_of(found.table) + " names no values", "--table FILE"});
+            found.table.clear();
+        }
         if (!found.table.empty())
             decided({"names: " + name_of(found.table) + " beside the map", "--table FILE"});
         else if (options.names == "auto")
@@ -104,8 +130,7 @@ Result<FoundInputs> find_inputs(const MakeOptions& options, const Decided& decid
 
 Result<CaseFolder> CaseFolder::open(const std::string& out) {
     CaseFolder folder;
-    const fs::path whole(out);
-    folder.path_ = (whole.parent_path() / whole.stem()).string();
+    folder.path_ = folder_of_case(out).string();
     std::error_code code;
     fs::create_directories(folder.path_ + "/input", code);
     if (code) return Error{"folder cannot be made", folder.path_, code.message()};
@@ -170,7 +195,8 @@ std::vector<std::string> CaseFolder::exercises() const {
     std::vector<std::string> names;
     std::error_code code;
     for (const auto& entry : fs::directory_iterator(path_, code))
-        if (entry.path().extension() == ".toml" && entry.path().filename() != "case.toml")
+        if (entry.path().extension() == ".toml" && entry.path().filename() != "case.toml" &&
+            !entry.path().filename().string().starts_with('.'))
             names.push_back(entry.path().stem().string());
     std::sort(names.begin(), names.end());
     return names;
@@ -228,7 +254,14 @@ Result<std::string> recipe_text(const MakeOptions& options,
     out += "\n[inputs]\n";
     SONOCASE_TRY(const auto labels, folder.link(found.labels, "labels"));
     out += "labels = " + quoted(labels) + "\n";
-    if (!found.table.empty()) {
+    // Import looks for it beside the map, and whether it is that map's.
+    const bool dataset = options.table.empty() && found.table.ends_with("dataset.json");
+    std::error_code code;
+    if (dataset)
+        SONOCASE_TRY_DONE(folder.link(found.table, "dataset"));
+    else
+        fs::remove(folder.file("input/dataset.json"), code);
+    if (!found.table.empty() && !dataset) {
         SONOCASE_TRY(const auto table, folder.link(found.table, "names"));
         out += "label_table = " + quoted(table) + "\n";
     }

@@ -8,6 +8,7 @@
 #include "formats/bundle/stage_files.h"
 #include "formats/text/nearest_name.h"
 #include "pipeline/anatomy/tissue_table.h"
+#include "pipeline/anatomy/torso_model.h"
 #include "pipeline/import/mesh/node_table.h"
 #include "pipeline/pathology/place_pathology.h"
 #include "pipeline/stages/built_in_stages.h"
@@ -84,7 +85,9 @@ Status assign_tissues(const Recipe& recipe, std::vector<Label>& labels) {
                              "expected a pattern of the label map's names"};
             continue;
         }
-        const auto found = std::find(names.begin(), names.end(), choice.label);
+        auto found = std::find(names.begin(), names.end(), choice.label);
+        if (found == names.end())  // the label map may spell it so
+            found = std::find(names.begin(), names.end(), standard_name(choice.label));
         if (found == names.end()) {
             if (std::find(known_class.begin(), known_class.end(), choice.label) !=
                 known_class.end())

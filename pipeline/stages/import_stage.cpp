@@ -3,9 +3,16 @@
 // import: reads a segmented CT, or samples the analytic torso, into labels in the `ct` frame.
 #include "pipeline/stages/import_stage.h"
 
+#include <algorithm>
+#include <map>
+
+#include "formats/files/atomic_file.h"
 #include "formats/files/load_save.h"
+#include "formats/text/excerpt.h"
 #include "pipeline/anatomy/anatomy_check.h"
+#include "pipeline/anatomy/torso_model.h"
 #include "pipeline/import/body/scan_body.h"
+#include "pipeline/import/mesh/node_table.h"
 #include "pipeline/stages/built_in_stages.h"
 #include "pipeline/stages/case_tissues.h"
 #include "pipeline/stages/label_codec.h"
@@ -144,6 +151,80 @@ Result<StageValue> run(StageInputs& inputs, const Progress& progress) {
         LabelFile{"ct", std::move(imported.labels), {}, {}, {std::move(imported.report)}});
 }
 
+constexpr int kRenamingVersion = 1;
+
+// The values in quotes of a TOML text that spell a standard name otherwise. Names and titles are
+// for people.
+void add_own_names(std::string_view toml, std::vector<std::string>& own) {
+    while (!toml.empty()) {
+        const std::size_t end = std::min(toml.find('\n'), toml.size() - 1) + 1;
+        const std::string_view line = toml.substr(0, end);
+        toml.remove_prefix(end);
+        const std::string_view key = line.substr(0, line.find_first_of(" ="));
+        if (key == "name" || key == "title") continue;
+        for (std::size_t at = 0; (at = line.find('"', at)) != line.npos;) {
+            const std::size_t close = line.find('"', at + 1);
+            if (close == line.npos) break;
+            const std::string word(line.substr(at + 1, close - at - 1));
+            const std::size_t next = line.find_first_not_of(" \t", close + 1);
+            const bool is_key = next != line.npos && line[next] == '=';
+            if (const std::string name = standard_name(word);
+                !is_key && !name.empty() && name != word)
+                own.push_back(word);
+            at = close + 1;
+        }
+    }
+}
+
+// Names of labels as the file spells them that the recipe or its exercises use. Those labels keep
+// their names. Lines of [labels] find a label by any spelling.
+std::vector<std::string> own_names(const Recipe& recipe) {
+    std::vector<std::string> own;
+    add_own_names(recipe.text, own);
+    for (const EmbeddedExercise& exercise : recipe.exercises) add_own_names(exercise.toml, own);
+    std::sort(own.begin(), own.end());
+    own.erase(std::unique(own.begin(), own.end()), own.end());
+    return own;
+}
+
+std::string renaming_text(const Recipe& recipe) {
+    std::string text;
+    for (const std::string& name : own_names(recipe)) text += " " + name;
+    for (const LabelChoice& choice : recipe.labels)
+        if (choice.label.find('*') != std::string::npos) text += " " + choice.label;
+    if (recipe.inputs.label_table.empty())
+        if (const auto side = table_beside(recipe.resolve(recipe.inputs.labels)); !side.empty())
+            if (const auto digest = digest_of_file(side)) text += " " + *digest;
+    return key_text(text, {double{kRenamingVersion}});
+}
+
+// Gives labels the names that exercises and checks know, where a file spells them otherwise.
+void rename_to_standard(const Recipe& recipe, ImportedLabels& imported) {
+    std::vector<Label>& labels = imported.labels.labels;
+    std::vector<std::string> own = own_names(recipe);
+    const auto by_pattern = [&](const std::string& name, const std::string& standard) {
+        return std::any_of(recipe.labels.begin(), recipe.labels.end(),
+                           [&](const LabelChoice& choice) {
+                               return choice.label.find('*') != std::string::npos &&
+                                      matches_pattern(choice.label, name) &&
+                                      !matches_pattern(choice.label, standard);
+                           });
+    };
+    std::map<std::string, int> meant;
+    for (const Label& label : labels) ++meant[standard_name(label.name)];
+    std::vector<std::string> renamed;
+    for (Label& label : labels) {
+        const std::string name = standard_name(label.name);
+        if (name.empty() || name == label.name || meant[name] > 1 || by_pattern(label.name, name) ||
+            std::find(own.begin(), own.end(), label.name) != own.end())
+            continue;
+        renamed.push_back("'" + label.name + "' is " + name);
+        if (label.colour == label_colour(label.name)) label.colour = label_colour(name);
+        label.name = name;
+    }
+    if (!renamed.empty()) imported.report.notes.push_back({"renamed", excerpt(renamed)});
+}
+
 // The texts hold everything that the labels and their report depend on; for the analytic torso,
 // what its label map shows of it.
 std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& digests) {
@@ -158,9 +239,9 @@ std::vector<std::string> key_texts(const Recipe& recipe, const InputDigests& dig
     if (is_mesh_source(recipe.resolve(in.labels)))
         return {key_text(files + " axes " + in.labels_axes,
                          {in.labels_scale, kMeshImportVersion, kAnatomyCheckVersion})};
-    return {key_text(files + " " + in.label_names + " " + in.orientation,
-                     {in.labels_scale, in.resample_shear ? 1.0 : 0.0, kVolumeReadingVersion,
-                      kAnatomyCheckVersion})};
+    return {renaming_text(recipe), key_text(files + " " + in.label_names + " " + in.orientation,
+                                            {in.labels_scale, in.resample_shear ? 1.0 : 0.0,
+                                             kVolumeReadingVersion, kAnatomyCheckVersion})};
 }
 
 StageVerb verb() {
@@ -230,6 +311,7 @@ Result<ImportedLabels> read_inputs(const Recipe& recipe,
                                                               : Orientation::automatic;
     options.reading.resample_shear = in.resample_shear;
     SONOCASE_TRY(auto imported, import_label_map(path, options, progress));
+    rename_to_standard(recipe, imported);
     if (in.scan.empty()) return imported;
     const std::string scan_path = recipe.resolve(in.scan);
     report_progress(progress, 0.7, "reading the scan");

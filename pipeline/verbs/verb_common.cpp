@@ -130,7 +130,7 @@ int wrong_usage(const char* verb, const std::string& what) {
 void print_notes(const char* verb, const StageReport& report) {
     for (const Note& note : report.notes)
         if (note.name == "axes" || note.name == "unit" || note.name == "surface_axes" ||
-            note.name == "surface_unit")
+            note.name == "surface_unit" || note.name == "table" || note.name == "renamed")
             std::fprintf(stderr, "sonocase %s: %s: %s\n", verb, note.name.c_str(),
                          one_line(note.text).c_str());
 }

@@ -69,6 +69,7 @@ int verb_make(int argc, char** argv) {
     const ThreadLimit limit(common.threads);
     const Stopwatch watch;
     Result<MadeCase> made = MadeCase{};
+    std::vector<std::string> warnings;
     nlohmann::ordered_json report{{"decisions", nlohmann::ordered_json::array()}};
     {
         ProgressBar bar(common, true);
@@ -82,11 +83,11 @@ int verb_make(int argc, char** argv) {
                 report["decisions"].push_back(
                     {{"what", decision.what}, {"otherwise", decision.otherwise}});
             },
-            progress);
+            progress, &warnings);
     }
-    if (!made) return fail("make", made.error());
-    for (const std::string& warning : made->warnings)
+    for (const std::string& warning : made ? made->warnings : warnings)
         std::fprintf(stderr, "sonocase make: warning: %s\n", warning.c_str());
+    if (!made) return fail("make", made.error());
     for (const std::string& fault : made->faults)
         std::fprintf(stderr, "sonocase make: fault: %s\n", fault.c_str());
     report["bundle"] = made->bundle;

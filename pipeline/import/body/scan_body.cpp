@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <string_view>
@@ -19,6 +20,7 @@ namespace {
 constexpr int kAirHu = -300, kFatHu = -30, kBoneHu = 200;
 constexpr double kOpeningMm = 6;  // half the thickness of what the opening takes off
 constexpr double kSkinMm = 2;
+constexpr double kThickSkinMm = 6;
 constexpr double kComplete = 0.95;
 
 using Mask = std::vector<std::uint8_t>;
@@ -156,9 +158,8 @@ void fill_holes(const Grid& grid, Mask& mask) {
     });
 }
 
-// 1 where the body is, with every voxel that has a label.
-Mask body_of(const LabelVolume& labels, const std::vector<std::int16_t>& hu) {
-    const Grid& grid = labels.grid;
+// 1 where the body is, with every voxel that is labelled.
+Mask body_of(const Grid& grid, const Mask& labelled, const std::vector<std::int16_t>& hu) {
     Mask dense(hu.size());
     for (std::size_t n = 0; n < hu.size(); ++n) dense[n] = hu[n] > kAirHu ? 1 : 0;
     Mask core = near_in_slices(grid, dense, 0, kOpeningMm);  // near air
@@ -168,7 +169,7 @@ Mask body_of(const LabelVolume& labels, const std::vector<std::int16_t>& hu) {
     Mask body =
         near_in_slices(grid, core, 1, kOpeningMm + std::max(grid.spacing_mm.x, grid.spacing_mm.y));
     for (std::size_t n = 0; n < body.size(); ++n)
-        body[n] = (body[n] != 0 && dense[n] != 0) || labels.voxels[n] != 0 ? 1 : 0;
+        body[n] = (body[n] != 0 && dense[n] != 0) || labelled[n] != 0 ? 1 : 0;
     fill_holes(grid, body);
     return body;
 }
@@ -218,19 +219,40 @@ Result<std::array<std::uint8_t, kFills>> fill_labels(LabelVolume& labels,
     return index;
 }
 
-// Takes labels that nothing was filled in for out of the palette's end.
-void drop_unused(LabelVolume& labels, std::size_t given) {
+// Takes labels without voxels out of the palette: covers, and those behind the given ones.
+void drop_unused(LabelVolume& labels, std::size_t given, const std::vector<bool>& cover) {
     std::vector<std::uint8_t> to(labels.labels.size(), 0);
     std::vector<bool> used(labels.labels.size(), false);
     for (const std::uint8_t label : labels.voxels) used[label] = true;
     std::vector<Label> kept;
     for (std::size_t l = 0; l < labels.labels.size(); ++l) {
-        if (l >= given && !used[l]) continue;
+        if (!used[l] && (l >= given || cover[l])) continue;
         to[l] = static_cast<std::uint8_t>(kept.size());
         kept.push_back(std::move(labels.labels[l]));
     }
     labels.labels = std::move(kept);
     for (std::uint8_t& label : labels.voxels) label = to[label];
+}
+
+// Whether a label is all that lies within the skin, as TotalSegmentator's task "body" and planning
+// systems draw it: it does not tell what lies there. A skin counts where it is no thin layer.
+bool is_cover(const LabelVolume& labels, std::size_t label) {
+    const Label& of = labels.labels[label];
+    if (of.tissue != "soft_tissue" && of.tissue != "skin") return false;
+    std::string name;
+    for (const char c : of.name)
+        if (std::isalpha(static_cast<unsigned char>(c)) != 0)
+            name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    for (const char* whole : {"body", "bodytrunc", "bodytrunk", "bodyextremities", "wholebody",
+                              "trunk", "torso", "external", "outerbody", "outercontour"})
+        if (name == whole) return true;
+    if (name != "skin") return false;
+    Mask skin(labels.voxels.size());
+    std::size_t all = 0, inner = 0;
+    for (std::size_t n = 0; n < skin.size(); ++n) all += skin[n] = labels.voxels[n] == label;
+    const Mask edge = near_in_slices(labels.grid, skin, 0, kThickSkinMm);
+    for (std::size_t n = 0; n < skin.size(); ++n) inner += skin[n] != 0 && edge[n] == 0;
+    return 10 * inner > all;
 }
 
 bool is_gut(std::string_view name) {
@@ -332,24 +354,42 @@ Status fill_from_scan(const ScanVolume& scan, const std::string& where, Imported
     const std::vector<std::int16_t> hu = on_grid_of(grid, scan);
     SONOCASE_TRY_DONE(check_scan(labels, hu, scan, where, report));
     for (const std::string& warning : scan.warnings) report.warnings.push_back("scan: " + warning);
-    const Mask body = body_of(labels, hu);
+    const std::size_t given = labels.labels.size();
+    std::vector<bool> cover(given, false);
+    std::string covers;
+    for (std::size_t l = 1; l < given; ++l)
+        if ((cover[l] = is_cover(labels, l)))
+            covers += (covers.empty() ? "'" : ", '") + labels.labels[l].name + "'";
+    Mask has_label(hu.size());
+    for (std::size_t n = 0; n < hu.size(); ++n)
+        has_label[n] = labels.voxels[n] != 0 && !cover[labels.voxels[n]] ? 1 : 0;
+    const Mask body = body_of(grid, has_label, hu);
     std::size_t in_body = 0, without = 0;
     for (std::size_t n = 0; n < body.size(); ++n) {
         in_body += body[n];
-        without += body[n] != 0 && labels.voxels[n] == 0;
+        without += body[n] != 0 && has_label[n] == 0;
     }
     const double voxel_ml = grid.voxel_volume_mm3() / 1000;
-    const double labelled = 1 - static_cast<double>(without) / static_cast<double>(in_body);
+    const double labelled =
+        in_body == 0 ? 1 : 1 - static_cast<double>(without) / static_cast<double>(in_body);
     report.measures.push_back({"scan_body_ml", static_cast<double>(in_body) * voxel_ml});
     if (labelled >= kComplete) {
         report.notes.push_back(
             {"scan", text("not needed: %.0f %% of the body has a label", 100 * labelled)});
+        report.warnings.push_back(
+            text("the scan is not used, as %.0f %% of the body has a label", 100 * labelled) +
+            "; leave it out, or take labels out of the map where it is to fill in the body");
         return Done{};
     }
-    const std::size_t given = labels.labels.size();
+    if (!covers.empty())
+        report.warnings.push_back(
+            "the scan fills in what only " + covers +
+            " names, as that is all of the body; leave the scan out to keep it as it is");
     SONOCASE_TRY(const auto fill, fill_labels(labels, where));
     std::vector<bool> gut(labels.labels.size(), false);
     for (std::size_t l = 1; l < given; ++l) gut[l] = is_gut(labels.labels[l].name);
+    for (std::uint8_t& label : labels.voxels)
+        if (cover[label]) label = 0;
     const Mask near_air = near_in_slices(grid, body, 0, kSkinMm);
     parallel_for(static_cast<std::size_t>(grid.size.z), 1, [&](std::size_t begin, std::size_t end) {
         for (int k = static_cast<int>(begin); k < static_cast<int>(end); ++k)
@@ -371,7 +411,7 @@ Status fill_from_scan(const ScanVolume& scan, const std::string& where, Imported
                     label = fill[near_air[n] != 0 ? kSkin : of];
                 }
     });
-    drop_unused(labels, given);
+    drop_unused(labels, given, cover);
     report.measures.push_back({"scan_filled_ml", static_cast<double>(without) * voxel_ml});
     report.notes.push_back(
         {"scan", text("filled in %.0f %% of the body by its density", 100 * (1 - labelled))});

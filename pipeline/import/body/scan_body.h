@@ -13,6 +13,9 @@
 //     other_bone  above 200
 //     skin        the outermost 2 mm towards air, one voxel at least, of the last three
 //
+// A label of the whole body ("body", "body_trunc", "External", a skin that is no thin layer) counts
+// as no label: what lies within is what the scan is for.
+//
 // The faces of the grid are no skin: there the field of view cuts the body.
 #pragma once
 
@@ -24,16 +27,16 @@
 
 namespace sonocase::pipeline::inline import_body {
 
-inline constexpr int kScanBodyVersion = 1;
+inline constexpr int kScanBodyVersion = 2;
 
-// Completes the labels in place. A map that has a label in 95 % of the body is left as it is. The
-// report gets the measures scan_body_ml and scan_filled_ml, scan_fat_in_organs and scan_bone_hu
-// where enough of these is labelled, and the note "scan". The scan's grid may be another than that
-// of the labels: the nearest voxel counts. A warning where organs have the density of fat or air in
-// more than 12 % of their voxels. Errors: a scan that does not cover the labels, is in no
-// Hounsfield units, shows no body where the labels are, or shows neither organs nor bone there.
-// Cost: 0.1 us per voxel of the label map and 0.3 us per voxel filled in. Memory: four bytes per
-// voxel of the label map.
+// Completes the labels in place. A map that has a label in 95 % of the body is left as it is, with
+// a warning, and so is a word said of labels of the whole body. The report gets the measures
+// scan_body_ml and scan_filled_ml, scan_fat_in_organs and scan_bone_hu where enough of these is
+// labelled, and the note "scan". The scan's grid may be another than that of the labels: the
+// nearest voxel counts. A warning where organs have the density of fat or air in more than 12 % of
+// their voxels. Errors: a scan that does not cover the labels, is in no Hounsfield units, shows no
+// body where the labels are, or shows neither organs nor bone there. Cost: 0.1 us per voxel of the
+// label map and 0.3 us per voxel filled in. Memory: four bytes per voxel of the label map.
 Status fill_from_scan(const ScanVolume& scan, const std::string& where, ImportedLabels& imported);
 
 }  // namespace sonocase::pipeline::inline import_body

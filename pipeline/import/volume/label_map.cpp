@@ -133,11 +133,13 @@ void mend_name(std::string& name, std::vector<std::string>& warnings) {
 struct NameSources {
     std::vector<LabelTable> tables;
     LabelTable segments;  // of a .seg.nrrd, by value and layer
+    std::string dataset;  // the dataset.json that is one of the tables
 };
 
 Result<NameSources> name_sources(const LabelLayers& file,
                                  const std::string& path,
                                  const ImportOptions& options,
+                                 std::vector<Note>& notes,
                                  std::vector<std::string>& warnings) {
     NameSources sources;
     const bool given = !options.table.empty();
@@ -173,19 +175,22 @@ Result<NameSources> name_sources(const LabelLayers& file,
             SONOCASE_TRY_DONE(check_table(*table, path));
         }
     }
-    if (is_volume_file_name(path) && !given) {
-        const std::string side =
-            (fs::path(path).parent_path() / (volume_stem(path) + ".csv")).string();
-        std::error_code code;
-        if (fs::is_regular_file(side, code)) {
-            auto table = load_label_table(side);
-            Status fine = table ? check_table(*table, side) : Status(table.error());
-            if (fine)
-                sources.tables.push_back(*std::move(table));
-            else
-                warnings.push_back("the file beside the map names no values and is left out (" +
-                                   fine.error().message().text() +
-                                   "): give --table if there is one");
+    if (const std::string side = given ? "" : table_beside(path); !side.empty()) {
+        auto table = load_label_table(side);
+        Status fine = table ? check_table(*table, side) : Status(table.error());
+        const bool dataset = !side.ends_with(".csv");
+        for (const std::int32_t value : file.values)
+            if (fine && dataset && value != 0 && entry_of(*table, value) == nullptr)
+                fine = Error{"no name for the value " + std::to_string(value), side,
+                             "it is another map's"};
+        if (fine) {
+            if (dataset) sources.dataset = side;
+            sources.tables.push_back(*std::move(table));
+            notes.push_back({"table", side.ends_with(".csv") ? "the CSV beside the map"
+                                                             : "the dataset.json of the map"});
+        } else {
+            warnings.push_back("the file beside the map names no values and is left out (" +
+                               fine.error().message().text() + "): give --table if there is one");
         }
     }
     return sources;
@@ -276,6 +281,50 @@ BodySummary summary_of(const StructureList& list, double scale) {
     return body;
 }
 
+// How well names fit, for a body of the size of one: that of another unit is told of as that, and
+// sizes say nothing of names.
+struct AssumedFit {
+    bool human = false;
+    NamesFit fit;
+    bool refused = false;  // a volume that nobody has, or other names that fit far better
+};
+AssumedFit fit_of(const BodySummary& body) {
+    AssumedFit of;
+    Box3 box;
+    for (const LabelSummary& label : body.labels) {
+        box.include(label.box.lower);
+        box.include(label.box.upper);
+    }
+    const Vector3 extent = box.extent() + body.voxel_mm;
+    const double length_mm = std::max({extent.x, extent.y, extent.z});
+    of.human = length_mm >= kMinTorsoMm && length_mm <= kMaxTorsoMm;
+    if (!of.human) return of;
+    constexpr int kManyExchanged = 3;
+    of.fit = names_fit(body);
+    of.refused = of.fit.gross;
+    if (!of.fit.misfits.empty())
+        for (const AnatomyFinding& finding : check_anatomy(body).findings)
+            of.refused = of.refused || finding.renamed >= kManyExchanged;
+    return of;
+}
+
+// The folder's dataset.json may be another map's.
+Status check_dataset(const std::string& path,
+                     const ImportOptions& options,
+                     const NameSources& sources,
+                     const StructureList& list) {
+    if (sources.dataset.empty()) return Done{};
+    BodySummary body = summary_of(list, options.scale);
+    for (LabelSummary& label : body.labels)
+        for (const Structure& s : list.structures)
+            if (s.entry.value == label.value) label.name = s.entry.name;
+    const AssumedFit of = fit_of(body);
+    if (!of.refused) return Done{};
+    return Error{"the names of " + sources.dataset + " do not fit: " + of.fit.misfits.front(), path,
+                 "if it is another map's, give --table with rows of value,name, or --names; if it "
+                 "is right, give it as --table"};
+}
+
 // Names by the number alone, where the file and the tables name none or name others as
 // TotalSegmentator does. Sizes and places must not speak against them.
 Status assume_names(const std::string& path,
@@ -293,24 +342,13 @@ Status assume_names(const std::string& path,
     if (named.empty()) return Done{};
     const std::string examples = excerpt(named);
     const BodySummary body = summary_of(list, options.scale);
-    Box3 box;
-    for (const LabelSummary& label : body.labels) {
-        box.include(label.box.lower);
-        box.include(label.box.upper);
-    }
-    // A body of another unit is told of as that: sizes say nothing of names.
-    const Vector3 extent = box.extent() + body.voxel_mm;
-    const double length_mm = std::max({extent.x, extent.y, extent.z});
-    NamesFit fit;
+    const auto [human, fit, misnamed] = fit_of(named_by(total, body));
     std::vector<const Numbering*> others;
-    if (length_mm >= kMinTorsoMm && length_mm <= kMaxTorsoMm) {
-        fit = names_fit(named_by(total, body));
-        if (none_named) others = other_numberings(total, body);
-    }
+    if (human && none_named) others = other_numberings(total, body);
     // Of a few organs in an order that few people have, another numbering is the less likely cause.
     constexpr std::size_t kMany = 5;
     const bool refused =
-        fit.gross || (!fit.misfits.empty() && !others.empty() && body.labels.size() >= kMany);
+        misnamed || (!fit.misfits.empty() && !others.empty() && body.labels.size() >= kMany);
     const std::string source =
         none_named ? "neither the file nor a table names its values" : "no table names some values";
     if (refused) {
@@ -402,7 +440,7 @@ Result<StructureList> read_label_file(const std::string& path, const ImportOptio
     list.grid = file.grid;
     list.notes = std::move(file.notes);
     list.warnings = std::move(file.warnings);
-    SONOCASE_TRY(const auto sources, name_sources(file, path, options, list.warnings));
+    SONOCASE_TRY(const auto sources, name_sources(file, path, options, list.notes, list.warnings));
     std::vector<int> channels;
     if (file.layers.size() > 1 && sources.segments.empty()) {
         SONOCASE_TRY(channels, channel_values(file, path, list.warnings));
@@ -456,6 +494,7 @@ Result<StructureList> read_label_file(const std::string& path, const ImportOptio
         unlike_total = unlike_total || (!total.empty() && structure.entry.name != total);
     }
     leave_out_background(list);
+    SONOCASE_TRY_DONE(check_dataset(path, options, sources, list));
     // Segments and names unlike TotalSegmentator's say that it did not number the values.
     if (sources.segments.empty() && !unlike_total) {
         SONOCASE_TRY_DONE(assume_names(path, options, none_named, list));
@@ -577,9 +616,8 @@ void leave_out_common_parts(std::vector<Structure>& structures, std::vector<Note
                 cut_back = b;
             }
     if (cut_front + cut_back == 0) return;
-    notes.push_back({"names", "those of the files without '" + first.substr(0, cut_front) +
-                                  (cut_front > 0 && cut_back > 0 ? "' and '" : "") +
-                                  first.substr(first.size() - cut_back) + "'"});
+    // What they share may be a patient's name, and the note is kept in the case.
+    notes.push_back({"names", "those of the files without what all of them have in common"});
     for (Structure& s : structures)
         s.entry.name = s.entry.name.substr(cut_front, s.entry.name.size() - cut_front - cut_back);
 }
@@ -819,6 +857,16 @@ std::vector<std::string> names_options() {
     std::vector<std::string> options{"auto", "none"};
     for (const Numbering& numbering : numberings()) options.emplace_back(numbering.key);
     return options;
+}
+
+std::string table_beside(const std::string& map) {
+    if (!is_volume_file_name(map)) return "";
+    const fs::path folder = fs::absolute(map).lexically_normal().parent_path();
+    std::error_code code;
+    for (const fs::path& side : {folder / (volume_stem(map) + ".csv"), folder / "dataset.json",
+                                 folder.parent_path() / "dataset.json"})
+        if (fs::is_regular_file(side, code)) return side.string();
+    return "";
 }
 
 Box3 body_box(const LabelVolume& labels) {

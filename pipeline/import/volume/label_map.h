@@ -41,9 +41,9 @@ struct ImportOptions {
     VolumeReading reading;
     // Names of values that nothing names, one of names_options(). "auto": those of TotalSegmentator
     // v2 "total", with a warning unless sizes and places of the structures speak for them, and an
-    // error where they speak against them; never where segments or other names show that the map is
-    // numbered otherwise. "none": label_1, label_2, ... Else a numbering, which also comes before
-    // the names in the file.
+    // error where they speak against them, or for other names of three structures or more; never
+    // where segments or other names show that the map is numbered otherwise. "none": label_1,
+    // label_2, ... Else a numbering, which also comes before the names in the file.
     std::string names = "auto";
 };
 
@@ -66,7 +66,8 @@ inline constexpr int kVolumeReadingVersion = 3;
 // that does not exist is an error. Where masks or segments overlap the smaller structure remains: a
 // vessel stays in its liver.
 //
-// The report says what was assumed: names by number alone (assumed_names), and by a warning which
+// The report says what was assumed: names by number alone (assumed_names), the table that lay with
+// the map (note "table"), and by a warning which
 // of two transforms, which axes, which unit.
 //
 // Errors, each with what was found and what to do: no such file; a pipe or a device; unreadable or
@@ -79,6 +80,10 @@ Result<ImportedLabels> import_label_map(const std::string& path,
 
 // "auto", "none", and the numberings that are known: "total", "total_v1", "amos", ...
 std::vector<std::string> names_options();
+
+// The table that lies with a label map: the CSV of its name beside it, else dataset.json, as
+// nnU-Net and MONAI leave it, beside it or in the folder above. Empty: none.
+std::string table_beside(const std::string& map);
 
 // Bounding box of everything that is not outside, to the outer faces of the voxels, in the
 // volume's frame.

@@ -135,6 +135,57 @@ TEST_F(LabelNames, NumbersOfOthersAreRefusedWithTheOptionThatReadsThem) {
     EXPECT_EQ(names_of(import_label_map(map(shuffled), none_named))[9], "label_9");
 }
 
+// Numbers 1, 2, 3 ... as any network gives them: sizes and places know better than the numbers.
+TEST_F(LabelNames, NumbersOfANetworkAreRefusedWhereThreeNamesWouldBeExchanged) {
+    const std::map<Organ, int> network{{liver, 1},       {spleen, 2}, {kidney_right, 3},
+                                       {kidney_left, 4}, {aorta, 5},  {stomach, 7}};
+    expect_refused(import_label_map(map(network)), "not numbered as in TotalSegmentator v2",
+                   "give --table");
+}
+
+TEST_F(LabelNames, DatasetJsonBesideTheMapOrAboveItNamesItsValues) {
+    const std::map<Organ, int> network{{liver, 1}, {spleen, 2}, {kidney_right, 3}, {aorta, 4}};
+    const char* v2 =
+        "{\"labels\":{\"background\":0,\"liver\":1,\"spleen\":2,\"kidney_right\":3,"
+        "\"aorta\":4},\"channel_names\":{\"0\":\"CT\"}}";
+    const char* v1 =
+        "{\"labels\":{\"0\":\"background\",\"1\":\"liver\",\"2\":\"spleen\","
+        "\"3\":\"kidney_right\",\"4\":\"aorta\"},\"modality\":{\"0\":\"CT\"}}";
+    int n = 0;
+    for (const char* text : {v2, v1})
+        for (const char* place : {"/labelsTr/dataset.json", "/dataset.json"}) {
+            const std::string in = "d" + std::to_string(n++);
+            folder.write(in + place, text);
+            const auto imported = import_label_map(map(network, in + "/labelsTr/case_001.nii"));
+            EXPECT_EQ(names_of(imported)[1], "liver");
+            EXPECT_EQ(names_of(imported)[4], "aorta");
+            EXPECT_TRUE(imported->report.warnings.empty());
+            EXPECT_EQ(imported->report.notes.back().name, "table");
+        }
+    folder.write("r/dataset.json", "{\"labels\":{\"background\":0,\"whole\":[1,2],\"tumour\":2}}");
+    EXPECT_TRUE(says(import_label_map(map(kTotal, "r/case.nii")), "region of several values"));
+}
+
+TEST_F(LabelNames, LabelGroupsOfMitkNameTheValuesOfTheirLayers) {
+    const auto with = [&](const std::string& groups) {
+        return import_label_map(folder.write(
+            "mitk.nrrd", testing::nrrd_bytes(ras_volume(),
+                                             "modality:=org.mitk.multilabel.segmentation\n"
+                                             "org.mitk.multilabel.segmentation.labelgroups:=" +
+                                                 groups + "\n")));
+    };
+    const auto imported = with(
+        "[{\"labels\":[{\"color\":{\"type\":\"ColorProperty\",\"value\":[1,0,0.5]},"
+        "\"name\":\"stomach\",\"value\":1},{\"name\":\"colon\",\"value\":5}]}]");
+    EXPECT_EQ(names_of(imported)[1], "stomach");
+    EXPECT_EQ(names_of(imported)[5], "colon");
+    EXPECT_EQ(imported->labels.labels[1].colour, (std::array<std::uint8_t, 3>{255, 0, 128}));
+    for (const char* damaged : {"[{\"labels\":[{\"name\":1}]}]", "[{}]", "[1]", "{",
+                                "[{\"labels\":["
+                                "{\"name\":\"a\",\"value\":1e99}]}]"})
+        expect_refused(with(damaged), "MITK's label groups", "table");
+}
+
 TEST_F(LabelNames, MirroredBodyIsReadWithAWarning) {
     TinyVolume volume = torso(kTotal);
     volume.columns(0, 0) *= -1;

@@ -84,6 +84,58 @@ TEST(ScanBody, what_organs_leave_is_filled_by_density_and_the_table_is_not) {
     for (const Label& label : labels.labels) EXPECT_NE(label.name, "other_bone");  // not used
 }
 
+double ml_of(const LabelVolume& labels, const std::string& name) {
+    double count = 0;
+    for (const std::uint8_t label : labels.voxels) count += labels.labels[label].name == name;
+    return count * labels.grid.voxel_volume_mm3() / 1000;
+}
+
+TEST(ScanBody, a_label_of_the_whole_body_leaves_its_inside_to_the_scan) {
+    Study plain = study();
+    ASSERT_TRUE(fill_from_scan(plain.scan, "ct", plain.imported));
+    for (const char* name : {"body", "Body", "body_trunc", "body trunk", "body-extremities",
+                             "External", "skin", "Skin"}) {
+        Study s = study();
+        LabelVolume& labels = s.imported.labels;
+        labels.labels.push_back(
+            {name, std::string(name).ends_with("kin") ? "skin" : "soft_tissue", 300, {}});
+        const Grid& grid = labels.grid;
+        for (std::size_t n = 0; n < labels.voxels.size(); ++n) {
+            const int i = static_cast<int>(n) % grid.size.x,
+                      j = static_cast<int>(n) / grid.size.x % grid.size.y;
+            if (labels.voxels[n] == 0 && in_body(grid.point_from_voxel({double(i), double(j), 0})))
+                labels.voxels[n] = 3;
+        }
+        const auto filled = fill_from_scan(s.scan, "ct", s.imported);
+        ASSERT_TRUE(filled) << filled.error().message();
+        for (const char* part : {"liver", "other_fat", "other_muscle", "skin", "gas_in_body"})
+            EXPECT_NEAR(ml_of(labels, part), ml_of(plain.imported.labels, part),
+                        0.01 * ml_of(plain.imported.labels, part))
+                << name << ": " << part;
+        EXPECT_TRUE(std::string(name) == "skin" || ml_of(labels, name) == 0) << name;
+        ASSERT_EQ(s.imported.report.warnings.size(), 1u) << name;
+        EXPECT_NE(s.imported.report.warnings[0].find(std::string("'") + name + "'"),
+                  std::string::npos);
+    }
+}
+
+TEST(ScanBody, a_skin_that_is_a_thin_layer_stays) {
+    Study s = study();
+    LabelVolume& labels = s.imported.labels;
+    labels.labels.push_back({"skin", "skin", 300, {}});
+    const Grid& grid = labels.grid;
+    for (std::size_t n = 0; n < labels.voxels.size(); ++n) {
+        const int i = static_cast<int>(n) % grid.size.x,
+                  j = static_cast<int>(n) / grid.size.x % grid.size.y;
+        const Point3 p = grid.point_from_voxel({double(i), double(j), 0});
+        if (in_body(p) && std::hypot(p.x / 95, p.y / 65) > 1) labels.voxels[n] = 3;
+    }
+    const double drawn = ml_of(labels, "skin");
+    ASSERT_TRUE(fill_from_scan(s.scan, "ct", s.imported));
+    EXPECT_GE(ml_of(labels, "skin"), drawn);
+    EXPECT_TRUE(s.imported.report.warnings.empty());
+}
+
 TEST(ScanBody, a_map_of_the_whole_body_stays_as_it_is) {
     Study s = study();
     ASSERT_TRUE(fill_from_scan(s.scan, "ct", s.imported));
