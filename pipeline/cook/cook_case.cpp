@@ -7,6 +7,7 @@
 
 #include "formats/text/nearest_name.h"
 #include "pipeline/cook/input_digests.h"
+#include "pipeline/cook/unnamed_inputs.h"
 #include "pipeline/stages/pack_case.h"
 #include "pipeline/stages/roles.h"
 
@@ -55,6 +56,7 @@ Result<CookResult> cook_case(const Recipe& recipe,
     manifest.inputs = std::move(inputs.files);
     for (const StageRun& run : result.stages)
         manifest.stages.push_back(without_seconds({run.report}).front());
+    leave_out_names(recipe, manifest);
     report_progress(progress, 1, "done");
     return result;
 }

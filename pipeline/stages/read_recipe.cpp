@@ -221,6 +221,7 @@ Status load_exercises(Recipe& recipe, std::vector<std::string> names) {
         for (const auto& entry :
              fs::directory_iterator(recipe.folder.empty() ? "." : recipe.folder, code))
             if (entry.path().extension() == ".toml" && entry.path().filename() != "case.toml" &&
+                !entry.path().filename().string().starts_with('.') &&
                 !fs::equivalent(entry.path(), recipe.path, code))
                 names.push_back(entry.path().stem().string());
         std::sort(names.begin(), names.end());

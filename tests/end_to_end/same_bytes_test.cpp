@@ -30,10 +30,10 @@ using sonocase::testing::run_command;
 // Bundles: since their fit says whether the sweep moved. Physical frames: since the
 // opening gain goes by the exercise's organ. Paper frames: of these bundles and of scripts that
 // keep clear of ribs.
-constexpr const char* kDraft = "093036b035d0862c4a335bc86fc074bb";
-constexpr const char* kBalanced = "2a8c71d4b9b094fff9a9ed5a610e1d3f";
-constexpr const char* kSlender = "8c995d66974a587acdb74e987eeeda9d";
-constexpr const char* kReal = "a4cdadb38fa5710382993a03d7c14317";
+constexpr const char* kDraft = "e21e6f4316c27e10d563573b9c596da1";
+constexpr const char* kBalanced = "e816193b729c254533686bdbfd4d420f";
+constexpr const char* kSlender = "6066f95adf71c6206973587949e37baf";
+constexpr const char* kReal = "baa49dc536db7c8981dabbb36f78700d";
 constexpr const char* kDraftPhysical = "acca27b34d2f1d055af23bcc21d9e73e";
 constexpr const char* kDraftPaper = "1aaccd9bf66881ec2231c9c0ceb219e6";
 constexpr const char* kRealPhysical = "a93b9816dc9e5cb9a036596e130601f0";

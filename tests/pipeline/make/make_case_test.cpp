@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -106,6 +107,7 @@ struct Outcome {
     std::optional<MadeCase> made;
     std::string sentence;  // where there is none
     std::vector<Decision> decisions;
+    std::vector<std::string> warnings;  // where there is none
 
     bool decided(const std::string& words) const {
         return std::any_of(decisions.begin(), decisions.end(), [&](const Decision& d) {
@@ -131,7 +133,8 @@ class MakeCase : public ::testing::Test {
     Outcome run(const MakeOptions& options) {
         Outcome outcome;
         auto made = make_case(
-            options, [&](const Decision& decision) { outcome.decisions.push_back(decision); });
+            options, [&](const Decision& decision) { outcome.decisions.push_back(decision); }, {},
+            &outcome.warnings);
         if (made)
             outcome.made = std::move(*made);
         else
@@ -384,6 +387,66 @@ TEST_F(MakeCase, names_of_another_language) {
     EXPECT_NE(outcome.sentence.find(" and " + std::to_string(renamed - 4) + " more;"),
               std::string::npos)
         << renamed << ": " << outcome.sentence;
+}
+
+// As people write names: every exercise is there, and what was renamed is told.
+TEST_F(MakeCase, names_in_other_letters_have_the_exercises_of_their_organs) {
+    Study study;
+    for (Label& label : study.labels.labels) {
+        if (!is_organ(label.name) || label.name == "outside") continue;
+        std::string& name = label.name;
+        std::replace(name.begin(), name.end(), '_', ' ');
+        if (name.ends_with(" right")) name = "right " + name.substr(0, name.size() - 6);
+        name[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(name[0])));
+    }
+    study.drawn = [](const std::string& name) {
+        return std::isupper(static_cast<unsigned char>(name[0])) != 0;
+    };
+    study.write(folder_, "Mustermann Erika");
+    const Outcome outcome = make("Mustermann Erika", "case", true);
+    ASSERT_TRUE(outcome.made) << outcome.sentence;
+    EXPECT_TRUE(outcome.decided("names: '"));
+    EXPECT_TRUE(outcome.decided("exercise liver-biopsy: target"));
+    EXPECT_TRUE(outcome.decided("exercise kidney-access: target"));
+    // Nobody's name is in the case or its page.
+    for (const char* file : {"case.sonocase", "case/check.html"})
+        EXPECT_EQ(read_text(folder_ / file).find("ustermann"), std::string::npos) << file;
+    const auto bundle = load_bundle(folder_ / "case.sonocase");
+    ASSERT_TRUE(bundle);
+    EXPECT_EQ(bundle->manifest.recipe.find('#'), std::string::npos);
+    for (const InputHash& input : bundle->manifest.inputs)
+        EXPECT_EQ(input.path.find('/'), std::string::npos) << input.path;
+}
+
+TEST_F(MakeCase, is_refused_where_its_folder_and_an_input_lie_in_each_other) {
+    Study{.drawn = is_organ}.write(folder_, "patient7");
+    const auto refused = [&](const std::string& input, const std::string& name,
+                             const std::string& words) {
+        const Outcome outcome = make(input, name);
+        expect_sentence(outcome, words);
+        expect_sentence(outcome, "give -o elsewhere");
+    };
+    refused("patient7", "patient7", "is the input");
+    refused("patient7/", "patient7", "is the input");
+    refused("patient7", "patient7/case", "lies in the input");
+    refused("patient7/ct", "patient7", "holds the input");
+    refused("patient7/seg/seg.dcm", "patient7", "holds the input");
+    EXPECT_FALSE(fs::exists(folder_ / "patient7/input"));
+    EXPECT_FALSE(fs::exists(folder_ / "patient7/case"));
+}
+
+// What file managers and editors leave beside the recipe.
+TEST_F(MakeCase, warnings_come_with_the_error_and_hidden_files_are_no_exercises) {
+    Study phantom;
+    for (Label& label : phantom.labels.labels)
+        if (label.name != "outside")
+            label.name = "tube_" + std::to_string(&label - phantom.labels.labels.data());
+    phantom.write(folder_, "disc");
+    folder_.write("case/._liver-biopsy.toml", std::string("\0\5\x16\7", 4));
+    const Outcome outcome = make("disc");
+    expect_sentence(outcome, "none of the exercises fits");
+    ASSERT_FALSE(outcome.warnings.empty());
+    EXPECT_TRUE(outcome.warnings[0].starts_with("import: ")) << outcome.warnings[0];
 }
 
 TEST_F(MakeCase, a_phantom) {

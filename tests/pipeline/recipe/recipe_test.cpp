@@ -6,8 +6,15 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <filesystem>
+#include <map>
 
+#include "../import/three_boxes.h"
+#include "pipeline/anatomy/torso_model.h"
+#include "pipeline/cook/unnamed_inputs.h"
 #include "pipeline/segmentation/resample_labels.h"
+#include "pipeline/stages/case_tissues.h"
+#include "pipeline/stages/import_stage.h"
 #include "support/hard_case.h"
 #include "support/paths.h"
 #include "support/temporary_folder.h"
@@ -207,6 +214,17 @@ TEST(Recipe, ExercisesBesideTheRecipeAreChecked) {
     EXPECT_NE(recipe.error().message().find("difficulty"), std::string::npos);
 }
 
+// What file managers of other systems and editors leave.
+TEST(Recipe, HiddenFilesBesideTheRecipeAreNoExercises) {
+    const TemporaryFolder folder;
+    folder.write("case.toml", "[analytic]\n");
+    folder.write("._liver-biopsy.toml", std::string("\0\5\x16\7", 4));
+    std::filesystem::create_symlink("erika@host.4711", folder / ".#liver-biopsy.toml");
+    const auto recipe = load_recipe(folder.path());
+    ASSERT_TRUE(recipe) << recipe.error().message();
+    EXPECT_TRUE(recipe->exercises.empty());
+}
+
 TEST(Recipe, EmbeddedDemoIsTheOneInScenarios) {
     const auto embedded = embedded_recipe();
     const auto file = load_recipe(std::string(SONOCASE_SOURCE) + "/scenarios/demo-torso");
@@ -299,6 +317,155 @@ TEST(Recipe, RefusesFineRegionsThatDoNotAddUp) {
             << recipe.error().message();
         EXPECT_EQ(recipe.error().message().find('\n'), std::string::npos);
     }
+}
+
+TEST(UnnamedInputs, CommentsAndPathsOfTheRecipeStayWithTheAuthor) {
+    const std::string text =
+        "# Mustermann, Erika\n"
+        "name = \"liver-7\"  # born 12.8.1964\n"
+        "title = \"Case #7 of \\\"ours\\\"\"\n"
+        "\n"
+        "[inputs] # Mustermann\n"
+        "labels = \"/data/Mustermann Erika/Mustermann.NII.gz\"\n"
+        "scan = '/data/Mustermann.Erika'   # CT\n"
+        "  # Mustermann\n"
+        "own_skin = true\n";
+    auto recipe = parse_recipe(text, "x.toml", {}, nullptr);
+    ASSERT_TRUE(recipe) << recipe.error().message();
+    const std::string kept = recipe_without_names(*recipe);
+    EXPECT_EQ(kept,
+              "name = \"liver-7\"\n"
+              "title = \"Case #7 of \\\"ours\\\"\"\n"
+              "\n"
+              "[inputs]\n"
+              "labels = \"labels.nii.gz\"\n"
+              "scan = \"scan\"\n"
+              "own_skin = true\n");
+    EXPECT_TRUE(parse_recipe(kept, "x.toml", {}, nullptr));
+
+    // Other ways to write the same.
+    for (const char* other : {"inputs.labels = \"/a/Erika/m.nii\"\ninputs.own_skin = true\n",
+                              "inputs = { labels = '/a/Erika/m.nii', own_skin = true }\n",
+                              "[inputs]\nlabels = \"\"\"/a/Erika/m.nii\"\"\"\nown_skin = true\n",
+                              "[inputs]\nlabels = \"/a/\\u0045rika/m.nii\"\nown_skin = true"}) {
+        recipe = parse_recipe(other, "x.toml", {}, nullptr);
+        ASSERT_TRUE(recipe) << other;
+        const std::string without = recipe_without_names(*recipe);
+        EXPECT_NE(without.find("\"labels.nii\""), std::string::npos) << without;
+        EXPECT_EQ(without.find("rika"), std::string::npos) << without;
+        EXPECT_TRUE(parse_recipe(without, "x.toml", {}, nullptr)) << without;
+    }
+}
+
+TEST(UnnamedInputs, ReportsNameTheRolesOfFiles) {
+    const TemporaryFolder folder;
+    folder.write("Mustermann Erika/segs/Mustermann_liver.nii.gz", "");
+    folder.write("Mustermann Erika/ct.mhd", "");
+    auto recipe = parse_recipe("[inputs]\nlabels = \"" + (folder / "Mustermann Erika/segs") +
+                                   "\"\nscan = \"" + (folder / "Mustermann Erika/ct.mhd") +
+                                   "\"\nown_skin = true\n",
+                               "x.toml", {}, nullptr);
+    ASSERT_TRUE(recipe);
+    CaseManifest manifest;
+    manifest.inputs = {{recipe->inputs.labels, "1"}, {recipe->inputs.scan, "2"}};
+    manifest.stages.emplace_back();
+    manifest.stages[0].warnings = {"Mustermann_liver.nii.gz: has no orientation",
+                                   "scan: " + recipe->inputs.scan + " is odd",
+                                   "42 voxels of liver are odd"};
+    manifest.stages[0].notes = {{"axes", "from " + (folder / "Mustermann Erika/ct.raw")}};
+    leave_out_names(*recipe, manifest);
+    EXPECT_EQ(manifest.inputs[0].path, "labels");
+    EXPECT_EQ(manifest.inputs[0].digest, "1");
+    EXPECT_EQ(manifest.inputs[1].path, "scan.mhd");
+    EXPECT_EQ(manifest.stages[0].warnings,
+              (std::vector<std::string>{"a file of labels: has no orientation",
+                                        "scan: scan.mhd is odd", "42 voxels of liver are odd"}));
+    EXPECT_EQ(manifest.stages[0].notes[0].text, "from ct.raw");
+}
+
+TEST(StandardName, IsFoundInOtherLettersAndNeverForASynonym) {
+    for (const auto& [given, name] :
+         std::map<std::string, std::string>{{"Liver", "liver"},
+                                            {"Kidney right", "kidney_right"},
+                                            {"right kidney", "kidney_right"},
+                                            {"Kidney-RT", "kidney_right"},
+                                            {"L_Kidney", "kidney_left"},
+                                            {"LeftKidney", "kidney_left"},
+                                            {"Gall Bladder", "gallbladder"},
+                                            {"Adrenal gland (L)", "adrenal_gland_left"},
+                                            {"Left rib 7", "rib_left_7"},
+                                            {"Vertebrae L5", "vertebrae_L5"},
+                                            {"lung upper lobe left", "lung_upper_lobe_left"},
+                                            {"kidney_left", "kidney_left"}})
+        EXPECT_EQ(standard_name(given), name) << given;
+    for (const char* other : {"", "kidney", "right left kidney", "liver r", "hepar", "ileum",
+                              "body", "label_5", "portal_vein", "Liver vessel", "left"})
+        EXPECT_EQ(standard_name(other), "") << other;
+}
+
+class RenamedLabels : public ::testing::Test {
+  protected:
+    Result<ImportedLabels> import(
+        const std::string& recipe_end = "",
+        const std::string& names = "1,Spleen\n2,right kidney\n5,Liver\n") {
+        folder_.write("map.nii", sonocase::testing::nifti_bytes(ras_volume()));
+        folder_.write("names.csv", "value,name\n" + names);
+        folder_.write(
+            "case.toml",
+            "name = \"case\"\n[inputs]\nlabels = \"map.nii\"\nlabel_table = \"names.csv\"\n"
+            "own_skin = true\n" +
+                recipe_end);
+        auto recipe = load_recipe(folder_ / "case.toml");
+        if (!recipe) return recipe.error();
+        recipe_ = std::move(*recipe);
+        return import_inputs(recipe_, {}, {});
+    }
+    static std::vector<std::string> names_of(const Result<ImportedLabels>& imported) {
+        std::vector<std::string> names;
+        if (!imported) {
+            ADD_FAILURE() << imported.error().message();
+            return names;
+        }
+        for (const Label& label : imported->labels.labels) names.push_back(label.name);
+        return names;
+    }
+    using Names = std::vector<std::string>;
+    TemporaryFolder folder_;
+    Recipe recipe_;
+};
+
+TEST_F(RenamedLabels, AreToldOfInOneLine) {
+    const auto imported = import();
+    EXPECT_EQ(names_of(imported), (Names{"outside", "spleen", "kidney_right", "liver"}));
+    EXPECT_EQ(imported->labels.labels[2].tissue, "kidney_cortex");
+    EXPECT_EQ(std::count_if(imported->report.notes.begin(), imported->report.notes.end(),
+                            [](const Note& note) {
+                                return note.name == "renamed" &&
+                                       note.text.find("'right kidney' is kidney_right") !=
+                                           std::string::npos;
+                            }),
+              1);
+    // Right names are not told of, and of two that mean the same none is changed.
+    EXPECT_EQ(names_of(import("", "1,spleen\n2,Liver\n5,LIVER\n")),
+              (Names{"outside", "spleen", "Liver", "LIVER"}));
+    EXPECT_EQ(names_of(import("", "1,spleen\n2,Liver\n5,liver\n")),
+              (Names{"outside", "spleen", "Liver", "liver"}));
+}
+
+TEST_F(RenamedLabels, AreStillFoundByTheWordsOfTheFile) {
+    auto imported = import("[labels]\nLiver = \"spleen\"\n\"right kidney\" = \"fat\"\n");
+    ASSERT_EQ(names_of(imported), (Names{"outside", "spleen", "kidney_right", "liver"}));
+    ASSERT_TRUE(assign_tissues(recipe_, imported->labels.labels));
+    EXPECT_EQ(imported->labels.labels[2].tissue, "fat");
+    EXPECT_EQ(imported->labels.labels[3].tissue, "spleen");
+    // A pattern of the file's words, and a name that an option or an exercise uses.
+    imported = import("[labels]\n\"right*\" = \"fat\"\n");
+    EXPECT_EQ(names_of(imported), (Names{"outside", "spleen", "right kidney", "liver"}));
+    ASSERT_TRUE(assign_tissues(recipe_, imported->labels.labels));
+    imported = import(
+        "[[pathology]]\nname = \"cyst\"\nkind = \"simple_cyst\"\nhost = \"Liver\"\nvolume_ml = "
+        "5\n");
+    EXPECT_EQ(names_of(imported), (Names{"outside", "spleen", "kidney_right", "Liver"}));
 }
 
 }  // namespace
