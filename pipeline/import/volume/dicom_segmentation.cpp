@@ -34,6 +34,7 @@ struct Segment {
     std::string name, code;  // code: "Liver (SCT 10200004)"
     std::string modifier;    // "Left"
     std::string label;       // where `name` is that of the code: what the file calls it
+    bool blank = false;      // the file's label says nothing
     std::string colour;      // "0.5 0.2 0.1", or empty
     std::vector<int> frames;
     std::uint64_t voxels = 0;
@@ -160,19 +161,20 @@ std::string name_of_code(const std::string& scheme,
     return "";
 }
 
-// Names segments by their codes, where their labels name no structure and nothing else of the body
-// either ("liver vessels" of the code "liver"), and no other segment has the same code.
+// Names segments by their codes, unless their labels name another structure or something else of
+// the body ("liver vessels" of the code "liver"), or another segment has the same code.
 void name_by_codes(std::vector<Segment>& segments, const std::vector<std::string>& coded) {
     for (std::size_t n = 0; n < segments.size(); ++n) {
         const std::string& name = coded[n];
         std::string label = lower_case(segments[n].name);
         std::replace(label.begin(), label.end(), ' ', '_');
-        if (name.empty() || std::count(coded.begin(), coded.end(), name) > 1 ||
-            is_known_structure(label))
-            continue;
+        if (name.empty() || std::count(coded.begin(), coded.end(), name) > 1) continue;
         const TissueChoice by_label = tissue_for_label(label);
-        if (by_label.known && by_label.tissue != tissue_for_label(name).tissue) continue;
-        segments[n].label = segments[n].name;
+        if (!segments[n].blank && label != name &&
+            (is_known_structure(label) ||
+             (by_label.known && by_label.tissue != tissue_for_label(name).tissue)))
+            continue;
+        if (label != name) segments[n].label = segments[n].name;
         segments[n].name = name;
     }
 }
@@ -240,7 +242,8 @@ Result<std::vector<Segment>> segments_of(const DicomSet& set, const std::string&
             }
         coded.push_back(name_of_code(
             scheme, code, side_of(side, segment.modifier + " " + meaning + " " + segment.name)));
-        if (says_nothing(segment.name) && !meaning.empty())
+        segment.blank = says_nothing(segment.name);
+        if (segment.blank && !meaning.empty())
             segment.name = segment.modifier.empty() ? meaning : meaning + " " + segment.modifier;
         if (segment.name.empty()) segment.name = "segment_" + std::to_string(segment.number);
         for (const Segment& other : segments)

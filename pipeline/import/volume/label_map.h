@@ -55,7 +55,7 @@ struct ImportedLabels {
 
 inline constexpr int kImportVersion = 2;
 // Of how volumes are read: part of the key of cached labels.
-inline constexpr int kVolumeReadingVersion = 3;
+inline constexpr int kVolumeReadingVersion = 4;
 
 // path  NIfTI, NRRD, .seg.nrrd, MetaImage; a folder with one binary mask per structure (file name =
 //       structure); a DICOM segmentation, or a folder with one (beside its CT, or alone) or with a
