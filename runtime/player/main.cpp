@@ -198,7 +198,7 @@ int parse_arguments(int argc, char** argv, PlayerArguments& arguments, bool& exi
     app.add_option("--attempt-seed", arguments.attempt_seed,
                    "Where the attempt's targets lie; 0: as written. Default: new for each attempt "
                    "in a window, a recording's own where it is replayed, else 0")
-        ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()));
+        ->check(CLI::Range(0.0, 9e18));  // as a double: 64 bits would wrap before the check
     app.add_option("--tracker", arguments.tracker, tracker_help());
     app.add_option("--calibration", arguments.calibrations,
                    "File of a calibration or a lag; may be repeated")
@@ -336,7 +336,7 @@ int run_dataset_command(int argc, char** argv) {
         ->required()
         ->check(CLI::Range(1, 100000000));
     app.add_option("--seed", arguments.seed, "Of all that is drawn, from 0 on; default: 1")
-        ->check(CLI::NonNegativeNumber);
+        ->check(CLI::Range(0.0, 9e18));  // as a double: 64 bits would wrap before the check
     app.add_option("--shard", shard, "I/N: the I-th of N parts, I from 1; default: 1/1");
     try {
         app.parse(argc, argv);

@@ -161,7 +161,7 @@ def test_a_bad_recipe_is_one_line_and_leaves_nothing(recipe, sonoplay, tmp_path,
 
 def test_bad_arguments(recipe, sonoplay, tmp_path):
     for arguments in ((), ("--frames", 3, "--shard", "3/2"), ("--frames", 0),
-                      ("--frames", 3, "--shard", "x"), ("--frames", 3, "--seed", -1), ("--frames", -3),
+                      ("--frames", 3, "--shard", "x"), ("--frames", 3, "--seed", -1), ("--frames", 3, "--seed", 10**20), ("--frames", -3),
                       ("--frames", 3, "--seed", "1.5"), ("--frames", 3, "--shard", "-1/2")):
         done = sonoplay("dataset", recipe, "-o", tmp_path / "out", *arguments, check=False)
         assert done.returncode == 2 and done.stderr.count("\n") == 1
