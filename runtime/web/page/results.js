@@ -31,7 +31,7 @@ export function when_store_opens(what) { on_late = what; }
 
 function open_database() {
     opening ??= new Promise((done) => {
-        let late = false, timer = 0, again = 1;
+        let late = false, timer = 0, again = 5;
         const give_up = () => {
             late = true;
             done(null);
@@ -148,11 +148,15 @@ function readable(id, record) {
 }
 // Oldest first, without recordings. null: this browser keeps nothing, and neither does the page.
 export async function kept_attempts() {
+    // Once more: the browser cleared the site's data while they were read, perhaps.
+    return read_attempts().catch(() => { opening = undefined; return read_attempts(); });
+}
+async function read_attempts() {
     const here = in_this_page.map((one) => ({...readable(undefined, one), in_page: one}));
     const from = await store('readonly');
     if (!from) return here.length ? here : null;
     const ids = await request(from.getAllKeys()), to_move = [];
-    const kept = await Promise.all(ids.map((id) => new Promise((done) => {
+    const kept = await Promise.all(ids.map((id) => new Promise((done, failed) => {
         const asked = from.get(id);
         asked.onsuccess = () => {
             const one = readable(id, asked.result);
@@ -160,6 +164,7 @@ export async function kept_attempts() {
             done(one);
         };
         asked.onerror = (event) => {
+            if (asked.error?.name === 'AbortError') return failed(asked.error);
             event?.preventDefault();  // the others are read all the same
             done({id, damaged: true});
         };

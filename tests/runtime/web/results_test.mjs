@@ -14,7 +14,8 @@ const open_page = () => import(`../../../runtime/web/page/results.js?${++pages}`
 
 // As much of IndexedDB as results.js uses; what it holds stays when a page opens anew. As in a browser, what a transaction
 // was asked for stays once it is complete. full(): the browser has no room: requests succeed, and the transaction is aborted.
-// blocked: an older page is open in another tab, until free() is called. version: of the newest page that was here.
+// blocked: an older page is open in another tab, until free() is called. version: of the newest page that was here. Once
+// `clears` is set, the next request meets the browser clearing the site's data, and the next three openings fail.
 function kept_storage({full = () => false, blocked = false, version = 0} = {}) {
     const stores = new Map(), storage = {stores, opened: 0};
     const later = (what) => setTimeout(what, 0);
@@ -40,6 +41,13 @@ function kept_storage({full = () => false, blocked = false, version = 0} = {}) {
             later(() => {
                 --waiting;
                 try {
+                    if (storage.clears) {
+                        storage.clears = false;
+                        storage.refuses = 3;
+                        db.closed = true;
+                        for (const of of stores.values()) of.rows.clear();
+                        throw new DOMException('cleared', 'AbortError');
+                    }
                     asked.result = work();
                     asked.onsuccess?.();
                 } catch (error) {
@@ -79,7 +87,11 @@ function kept_storage({full = () => false, blocked = false, version = 0} = {}) {
             return later(() => opening.onsuccess?.());
         };
         later(() => {
-            if (asked_version < version) {
+            if (storage.refuses > 0) {
+                --storage.refuses;
+                opening.error = new DOMException('being cleared', 'UnknownError');
+                opening.onerror?.();
+            } else if (asked_version < version) {
                 opening.error = new DOMException('newer', 'VersionError');
                 opening.onerror?.();
             } else if (blocked) {
@@ -241,6 +253,13 @@ await run_tests({
         newer.make('attempts', {keyPath: 'id'});
         newer.make('recordings', {keyPath: 'id'});
         expect_equal(await (await open_page()).keep_attempt(attempt_of(3)), true, 'a newer store is used as it is');
+    },
+    async a_list_that_is_read_while_the_browser_clears_is_empty_and_not_refused() {
+        const storage = globalThis.indexedDB = kept_storage(), page = await open_page();
+        await page.keep_attempt(attempt_of(1));
+        storage.clears = true;
+        expect_equal((await page.kept_attempts())?.length, 0, 'attempts');
+        expect_equal(await page.keep_attempt(attempt_of(2)), true, 'kept again');
     },
     async hundreds_go_in_pieces() {
         globalThis.indexedDB = kept_storage();
