@@ -249,7 +249,7 @@ void TruthRenderer::Impl::lay_out_rows(const Rigid& pose) {
     f.origin_y_px = static_cast<float>(geometry.origin_y_px);
     f.press = shown_press;
     f.closed_label = closed_label.data();
-    f.closes = f.press != nullptr && f.press->pressed && f.press->field->closed_nodes().any;
+    f.closes = f.press != nullptr && f.press->pressed && f.press->field->closed_marks().any;
     f.rays = pixels.rays();
     f.lines_per_ray = static_cast<float>(geometry.scanlines) / static_cast<float>(pixels.rays());
     const BreathingLattice* lattice = look_up.breathing();

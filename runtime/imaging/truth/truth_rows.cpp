@@ -131,7 +131,7 @@ HWY_NOINLINE void press_back(
     };
     p = {moved(p.x, 0), moved(p.y, 1), moved(p.z, 2)};
     closed = hn::Zero(di);
-    if (f.press->pressed && f.press->field->closed_nodes().any)
+    if (f.press->pressed && f.press->field->closed_marks().any)
         closed = lanes::closed_lanes(d, *f.press, place, shift);
 }
 
