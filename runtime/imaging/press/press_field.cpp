@@ -16,39 +16,43 @@ void mark_closed(std::span<const PressTissue> tissues,
                  const PressSamples& samples,
                  const PressColumns& columns,
                  PressClosed& out) {
+    constexpr int kMarks = PressClosed::kMarks, kAcross = PressClosed::kAcross;
     if (out.any) {
-        out.node.fill(0);
+        out.mark.fill(0);
         out.row.fill(false);
         out.part.fill(false);
     }
     out.any = false;
     out.open = -1;
     if (std::find(samples.lumen.begin(), samples.lumen.end(), true) == samples.lumen.end()) return;
-    const auto in_lumen = [&](int j, int i) {
-        return j < kFineRows && samples.lumen[j] && samples.drains.row(j)[i] >= 0.5f;
+    const auto at = [](const float* row, int i) {
+        const float *left = row + i / kMarks, part = static_cast<float>(i % kMarks) / kMarks;
+        return i % kMarks == 0 ? *left : *left + part * (left[1] - *left);
     };
-    for (int i = 0; i < kColumns; ++i)
+    const auto in_lumen = [&](int j, int i) {
+        return j < kFineRows && samples.lumen[j] && at(samples.drains.row(j), i) >= 0.5f;
+    };
+    std::array<bool, kFineRows * kAcross> shut{};
+    for (int i = 0; i < kAcross; ++i)
         for (int first = 0, j = 0; j < kFineRows; ++j) {
             if (!in_lumen(j, i)) continue;
             double height = 0, touching = 0;  // and the height at which walls touch
             for (first = j; in_lumen(j, i); ++j) {
-                const float share = samples.drains.row(j)[i];
-                height += fine_height(j) * double{columns.stretch.row(j)[i]};
+                const float share = at(samples.drains.row(j), i);
+                height += fine_height(j) * double{at(columns.stretch.row(j), i)};
                 touching += fine_height(j) * (share * kShut + (1 - share));
             }
-            for (int n = first; height < touching && n < j; ++n) out.part[n * kColumns + i] = true;
+            for (int n = first; height < touching && n < j; ++n) shut[n * kAcross + i] = true;
         }
-    const auto closed = [&](int j, int i) {
-        return j >= 0 && j < kFineRows && i >= 0 && i < kColumns && out.part[j * kColumns + i];
-    };
-    // A round lumen reaches less far up and down beside its middle, so half a row around is
-    // searched, and a quarter of a row in the columns beside.
-    constexpr int kAround = kParts / 2, kBeside = kParts / 4;
+    // A round lumen reaches less far up and down beside its middle, and further across than the
+    // parts that it fills to half: half a row around is searched, and half a column beside.
+    constexpr int kAround = kParts / 2, kBeside = kMarks / 2;
     const auto near = [&](int j, int i) {
-        for (int n = j - kAround; n <= j + kAround; ++n)
-            if (closed(n, i)) return true;
-        for (int n = j - kBeside; n <= j + kBeside; ++n)
-            if (closed(n, i - 1) || closed(n, i + 1)) return true;
+        for (int n = std::max(j - kAround, 0); n <= std::min(j + kAround, kFineRows - 1); ++n)
+            if (shut[n * kAcross + i]) return true;
+        if (in_lumen(j, i)) return false;
+        for (int n = std::max(i - kBeside, 0); n <= std::min(i + kBeside, kAcross - 1); ++n)
+            if (shut[j * kAcross + n]) return true;
         return false;
     };
     const auto nearest = [](float mm) {
@@ -63,25 +67,28 @@ void mark_closed(std::span<const PressTissue> tissues,
     double rest = 0, open = 0;  // heights
     for (int j = 0; j < kFineRows; ++j) {
         bool lumens = false;
-        for (int n = std::max(j - kParts / 2, 0); n <= std::min(j + kParts / 2, kFineRows - 1); ++n)
+        for (int n = std::max(j - kAround, 0); n <= std::min(j + kAround, kFineRows - 1); ++n)
             lumens = lumens || samples.lumen[n];
         if (!lumens) continue;
-        for (int i = 0; i < kColumns; ++i) {
-            const bool near_closed = near(j, i);
-            if (samples.lumen[j] && i >= kSideColumns && i < kSideColumns + kFaceColumns) {
-                const double height = drains(j, i) * fine_height(j);
-                rest += height;
-                if (!near_closed) open += height * double{columns.lumen.row(j)[i]};
-            }
-            if (!near_closed) continue;
+        for (int i = 0; i < kAcross; ++i) {
+            if (!near(j, i)) continue;
+            out.part[j * kAcross + i] = true;
             out.any = true;
-            // One of these nodes is the nearest to each place of the part.
-            const int first = nearest(columns.pressed_mm.row(j)[i]),
-                      last = nearest(columns.pressed_mm.row(j + 1)[i]);
+            // One of these marks is the nearest to each place of the part.
+            const int first = nearest(at(columns.pressed_mm.row(j), i)),
+                      last = nearest(at(columns.pressed_mm.row(j + 1), i));
             for (int m = first; m <= last; ++m) {
                 out.row_of(m)[i] = 1;
                 out.row[m] = true;
             }
+        }
+        for (int i = kSideColumns; samples.lumen[j] && i < kSideColumns + kFaceColumns; ++i) {
+            const double height = drains(j, i) * fine_height(j);
+            int marks = 0;  // of this column
+            for (int n = -kMarks / 2; n < kMarks / 2; ++n)
+                marks += out.part[j * kAcross + i * kMarks + n];
+            rest += height;
+            open += height * double{columns.lumen.row(j)[i]} * (kMarks - marks) / kMarks;
         }
     }
     constexpr double kMinMm2 = 4;
@@ -343,13 +350,14 @@ double PressField::skin_now_mm(double lateral_mm) const {
 }
 
 bool PressField::closed_in_plane(BeamPoint shown) const {
-    const PressClosed& nodes = work_->closed;
-    if (!state_.pressed || !nodes.any) return false;
+    const PressClosed& marks = work_->closed;
+    if (!state_.pressed || !marks.any) return false;
     if (dent_.moves()) shown = before_dent(shown);
     const RestPlace rest = pressed_in_plane(shown);
     const double column = std::clamp(column_of(face_, rest.lateral_mm), 0.0, kColumns - 1.0);
     const double row = std::clamp(shown.depth_mm / kTableStepMm, 0.0, kTableRows - 1.0);
-    return nodes.at(static_cast<int>(row + 0.5), static_cast<int>(column + 0.5)) != 0;
+    return marks.row_of(static_cast<int>(
+               row + 0.5))[static_cast<int>(column * PressClosed::kMarks + 0.5)] != 0;
 }
 
 Point3 PressField::pull_back(Point3 pressed) const {
@@ -395,14 +403,8 @@ bool PressField::closed(Point3 rest) const {
     const double below = p.depth_mm - skin_mm(face_, work_->samples, p.lateral_mm);
     const auto part = std::upper_bound(kFineEdge.begin(), kFineEdge.end(), below);
     const int j = std::clamp(static_cast<int>(part - kFineEdge.begin()) - 1, 0, kFineRows - 1);
-    // A round lumen reaches less far up and down beside its middle, so half a row around is
-    // searched.
-    constexpr int kAround = kParts / 2;
-    const int i = std::min(static_cast<int>(column), kColumns - 2);
-    for (int n = std::max(0, j - kAround); n <= std::min(kFineRows - 1, j + kAround); ++n)
-        for (int c = i; c <= i + 1; ++c)
-            if (work_->closed.part[n * kColumns + c]) return true;
-    return false;
+    return work_->closed
+        .part[j * PressClosed::kAcross + static_cast<int>(column * PressClosed::kMarks + 0.5)];
 }
 
 Point3 PressField::push_forward(Point3 rest) const {

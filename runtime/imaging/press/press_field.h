@@ -23,27 +23,29 @@
 
 namespace sonocase::runtime::press {
 
-// Where a lumen is closed, at the nodes of PressTable::rest_mm: 1 where the nearest tissue of the
-// column, or of the one beside it, is a lumen whose walls touch. The picture shows the wall there
-// instead of blood. A closed vein is a fraction of a millimetre high, less than the distance of
-// nodes, so that the nodes around it are marked.
+// Where a lumen is closed, at marks as far down as the nodes of PressTable::rest_mm and kMarks to a
+// column along the face: 1 where the nearest tissue of the mark, or of one up to a column beside
+// it, is a lumen whose walls touch. The picture shows the wall there instead of blood. A closed
+// vein is a fraction of a millimetre high, less than the distance of nodes, so that the marks
+// around it are set.
 struct PressClosed {
-    std::array<std::int32_t, kTableRows * kStride> node{};
-    std::array<bool, kTableRows> row{};             // some node of the row
-    std::array<bool, kFineRows * kColumns> part{};  // of rows: in a lumen that is closed there
+    static constexpr int kMarks = 4, kAcross = (kColumns - 1) * kMarks + 1;
+    std::array<std::int32_t, kTableRows * kAcross> mark{};
+    std::array<bool, kTableRows> row{};            // some mark of the row
+    std::array<bool, kFineRows * kAcross> part{};  // of rows: the same, at rest
     bool any = false;
     // Area of the draining lumens under the face that a picture shows open, over that at rest;
     // negative: that is less than 4 mm^2.
     double open = -1;
 
-    std::int32_t* row_of(int m) { return node.data() + m * kStride + kMargin; }
-    const std::int32_t* row_of(int m) const { return node.data() + m * kStride + kMargin; }
-    std::int32_t at(int m, int column) const { return row_of(m)[column]; }
+    std::int32_t* row_of(int m) { return mark.data() + m * kAcross; }
+    const std::int32_t* row_of(int m) const { return mark.data() + m * kAcross; }
 };
 
-// Walls touch all along a column's way through a lumen or not at all: where its height there, over
-// parts of rows that a lumen fills to at least half, is below kShut of its height at rest. Cost:
-// nothing where there is no lumen, 5 us where there is.
+// Walls touch all along the way of a mark's column through a lumen or not at all: where its height
+// there, over parts of rows that a lumen fills to at least half, is below kShut of its height at
+// rest. Between columns all of these are linear. Cost: nothing where there is no lumen, 10 us where
+// there is.
 void mark_closed(std::span<const PressTissue> tissues,
                  const PressFace& face,
                  const PressSamples& samples,
@@ -122,12 +124,12 @@ class PressField {
     BeamPoint shown_in_plane(BeamPoint rest) const;  // the inverse, by pools as well
     // Depth of the pressed skin below the face: 0 where it touches.
     double skin_now_mm(double lateral_mm) const;
-    bool closed_in_plane(BeamPoint shown) const;  // nearest node of closed_nodes()
-    const PressClosed& closed_nodes() const { return work_->closed; }
+    bool closed_in_plane(BeamPoint shown) const;  // nearest of closed_marks()
+    const PressClosed& closed_marks() const { return work_->closed; }
 
-    // True where `rest`, a place in a draining lumen, lies between walls that touch: the lumen's
-    // way in that column, or in the one beside it, is shut (mark_closed). A picture shows the wall
-    // instead, also where a lumen is too small for the columns to close it without a rest.
+    // True where `rest`, a place in a draining lumen, lies between walls that touch (mark_closed).
+    // A picture shows the wall instead, also where a lumen is too small for the columns to close it
+    // without a rest.
     bool closed(Point3 rest) const;
 
   private:

@@ -31,7 +31,7 @@ inline constexpr double kLumenGain = 2, kLumenGrowth = 1;
 inline constexpr double kClosing = 0.3, kClosed = 0.2, kMinLumen = 0.02;
 // A column's way through a lumen is shut where it is lower than this part of its height at rest:
 // parts of it have closed by then, and a vein gives way at once and not in layers.
-inline constexpr double kShut = 0.35;
+inline constexpr double kShut = 0.38;
 
 // Force on the face: what the tissue of all columns carries at a depth t, and what the tissue above
 // has handed on to its sides by then,

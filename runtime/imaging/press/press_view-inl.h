@@ -234,7 +234,7 @@ HWY_INLINE hn::Vec<hn::RebindToSigned<D>> closed_lanes(D d,
                                                        const PlaceLanes<D>& p,
                                                        const ShiftLanes<D>& shift) {
     const hn::RebindToSigned<D> di;
-    const PressClosed& nodes = v.field->closed_nodes();
+    const PressClosed& marks = v.field->closed_marks();
     constexpr float kPerStep = static_cast<float>(1 / kTableStepMm);
     const auto half = hn::Set(d, 0.5f), per_mm = hn::Set(d, v.columns_per_mm);
     const auto nearest = [&](auto x, float last) HWY_ATTR {
@@ -253,9 +253,10 @@ HWY_INLINE hn::Vec<hn::RebindToSigned<D>> closed_lanes(D d,
         depth = p.z;
     }
     const auto m = nearest(hn::Mul(depth, hn::Set(d, kPerStep)), kTableRows - 1.0f);
-    return hn::GatherIndex(
-        di, nodes.row_of(0),
-        hn::Add(hn::Mul(m, hn::Set(di, kStride)), nearest(column, kColumns - 1.0f)));
+    const auto i = nearest(hn::Mul(column, hn::Set(d, float{PressClosed::kMarks})),
+                           PressClosed::kAcross - 1.0f);
+    return hn::GatherIndex(di, marks.row_of(0),
+                           hn::Add(hn::Mul(m, hn::Set(di, PressClosed::kAcross)), i));
 }
 
 // False where no sample of a row can lie in a collapsed lumen.
@@ -264,7 +265,7 @@ inline bool may_close(const PressView& v, int k) {
     constexpr float kPerStep = static_cast<float>(1 / kTableStepMm);
     const float r = (static_cast<float>(k) + 0.5f) * v.step_mm;
     const int m = static_cast<int>(std::min(r * kPerStep, kTableRows - 1.0f) + 0.5f);
-    return v.field->closed_nodes().row[m];
+    return v.field->closed_marks().row[m];
 }
 
 // Adds to a stretch the shift by pools, whose surfaces it does not meet: it bends so little that it
@@ -347,7 +348,7 @@ HWY_NOINLINE void press_chunk(
     }
     if (gently) push_gently(d, v, line, beam, first, rows, every, still, out);
     out.any_closed = false;
-    if (!v.pressed || !v.field->closed_nodes().any) return;
+    if (!v.pressed || !v.field->closed_marks().any) return;
     for (int row = 0; row < rows; ++row) {
         const auto along = hn::Load(d, out.along + (row + 1) * kPressBeams + beam),
                    side = hn::Load(d, out.side + row * kPressBeams + beam);

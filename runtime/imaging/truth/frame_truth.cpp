@@ -111,6 +111,20 @@ bool draws_lesions(const RenderOptions& o) {
     return false;
 }
 
+// Neighbours mostly have one label, and a number that was just raised is not raised again at once.
+using LabelCounts = std::array<std::array<std::uint32_t, 256>, 4>;
+void count_labels(std::span<const std::uint8_t> labels, LabelCounts& counts) {
+    std::size_t n = 0;
+    for (std::uint64_t shown = 0; n + 8 <= labels.size(); n += 8) {
+        std::memcpy(&shown, &labels[n], 8);
+        if (shown == kEachByte * labels[n])
+            counts[0][labels[n]] += 8;
+        else
+            for (std::size_t i = n; i < n + 8; ++i) ++counts[i % 4][labels[i]];
+    }
+    for (; n < labels.size(); ++n) ++counts[0][labels[n]];
+}
+
 // False where the plane lies so many voxels away that single precision cannot tell neighbours
 // apart; there is no body there.
 bool near_enough(const Grid& grid, const Rigid& pose, const ScanGeometry& g) {
@@ -213,11 +227,21 @@ void TruthRenderer::Impl::ensure_loaded(const Rigid& pose) {
     const double seen_mm = std::hypot(across, 0.5 * geometry.depth_mm + radius) +
                            25 +  // the largest gap that contact closes
                            (pressed != nullptr ? pressed->farthest_mm() : 0);
+    const auto centre = [&](double i, double j, double k) {
+        return probe_from_mannequin * bundle->grid.point_from_voxel({half + i, half + j, half + k});
+    };
+    const Point3 first = centre(0, 0, 0);
+    const Vector3 step[3] = {centre(1, 0, 0) - first, centre(0, 1, 0) - first,
+                             centre(0, 0, 1) - first};
+    const double reach_mm = seen_mm + ball_mm;
     blocks->ensure_loaded([&](Int3 lower) {
-        const Point3 centre =
-            bundle->grid.point_from_voxel({lower.x + half, lower.y + half, lower.z + half});
-        const Point3 p = probe_from_mannequin * centre;
-        return std::abs(p.y) < ball_mm && std::hypot(p.x, p.z - middle_z) < seen_mm + ball_mm;
+        // There are thousands of blocks, and most lie beside the plane.
+        const auto along = [&](double Vector3::*axis) {
+            return lower.x * step[0].*axis + lower.y * step[1].*axis + lower.z * step[2].*axis;
+        };
+        if (std::abs(first.y + along(&Vector3::y)) >= ball_mm) return false;
+        const double x = first.x + along(&Vector3::x), z = first.z + along(&Vector3::z) - middle_z;
+        return x * x + z * z < reach_mm * reach_mm;
     });
 }
 
@@ -249,7 +273,7 @@ void TruthRenderer::Impl::lay_out_rows(const Rigid& pose) {
     f.origin_y_px = static_cast<float>(geometry.origin_y_px);
     f.press = shown_press;
     f.closed_label = closed_label.data();
-    f.closes = f.press != nullptr && f.press->pressed && f.press->field->closed_nodes().any;
+    f.closes = f.press != nullptr && f.press->pressed && f.press->field->closed_marks().any;
     f.rays = pixels.rays();
     f.lines_per_ray = static_cast<float>(geometry.scanlines) / static_cast<float>(pixels.rays());
     const BreathingLattice* lattice = look_up.breathing();
@@ -264,6 +288,7 @@ void TruthRenderer::Impl::lay_out_rows(const Rigid& pose) {
 
 void TruthRenderer::Impl::labels(const TruthPlanes& planes) {
     const bool dark = !planes.shadowed.empty();
+    LabelCounts counts{};
     tiles.look_up(simd, rows, planes.labels);
     pixels.set_outside(planes.labels, std::uint8_t{0});
     pixels.for_each_run([&](const TruthRun& run, std::size_t at) {
@@ -277,20 +302,17 @@ void TruthRenderer::Impl::labels(const TruthPlanes& planes) {
             if (one_by_one) truth_labels(simd, rows, run, n, end, to);
             n = end;
         }
-        // Runs of one label, mostly long.
-        for (int n = 0; n < run.count;) {
+        count_labels({to, static_cast<std::size_t>(run.count)}, counts);
+        for (int n = 0; dark && n < run.count;) {
             const std::uint8_t label = to[n];
-            int end = n + 1;
-            for (std::uint64_t shown = 0; end + 8 <= run.count; end += 8) {
-                std::memcpy(&shown, to + end, 8);
-                if (shown != kEachByte * label) break;
-            }
-            while (end < run.count && to[end] == label) ++end;
-            truth.pixels_of_label[label] += static_cast<std::uint32_t>(end - n);
-            if (dark && (rows.labels[label] & kHard) != 0) darken(run, n, end);
-            n = end;
+            const int begin = n;
+            while (n < run.count && to[n] == label) ++n;
+            if ((rows.labels[label] & kHard) != 0) darken(run, begin, n);
         }
     });
+    for (const auto& count : counts)
+        for (std::size_t label = 0; label < count.size(); ++label)
+            truth.pixels_of_label[label] += count[label];
 }
 
 // Makes the rays that hard pixels [begin, end) of a run cover dark from them on.
@@ -439,7 +461,6 @@ void TruthRenderer::Impl::planes_of(const FrameInput& input, const TruthPlanes& 
     (void)area;
     std::fill(first_hard_mm.begin(), first_hard_mm.end(), kNoHardMm);
     if (!planes.labels.empty()) {
-        ensure_loaded(input.mannequin_from_probe);
         if (near_enough(bundle->grid, input.mannequin_from_probe, geometry)) {
             labels(planes);
         } else {

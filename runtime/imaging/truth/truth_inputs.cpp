@@ -6,6 +6,8 @@
 #include <cmath>
 #include <string>
 
+#include <hwy/cache_control.h>
+
 #include "formats/volume/boundary_record.h"
 #include "formats/volume/brick_volume.h"
 #include "formats/volume/tissue.h"
@@ -172,25 +174,51 @@ void TruthTiles::look_up(SimdTarget simd, const TruthFrameRows& f, std::span<std
         for (int ray = 0; ray < f.rays; ++ray)
             air_before_[ray + 1] = air_before_[ray] + (f.gap_mm[ray] < 0 ? 1 : 0);
     std::fill(any_in_row_.begin(), any_in_row_.end(), false);
+    std::fill(one_by_one_.begin(), one_by_one_.end(), false);
+    // The last one of which the bricks, and the one before it, of which the voxels were asked for.
+    Waiting slots[3], *of_bricks = nullptr, *of_voxels = nullptr;
+    int next = 0;
+    const auto go_on = [&](Waiting* placed) {
+        Waiting* found =
+            of_bricks != nullptr && find(simd, f, labels, *of_bricks) ? of_bricks : nullptr;
+        if (of_voxels != nullptr) {
+            const Tile& t = *of_voxels->tile;
+            if (!truth_tile(simd, f, of_voxels->voxels, t.rows, columns(t), first_label(t, labels),
+                            width_px_))
+                mark_one_by_one(t);
+        }
+        of_voxels = found;
+        of_bricks = placed;
+    };
     for (const Tile& t : tiles_) {
-        bool found = f.press == nullptr || !bends(*f.press, t);
         const int in_air =
             f.gap_mm == nullptr ? 0 : air_before_[t.rays[1] + 1] - air_before_[t.rays[0]];
-        if (in_air > t.rays[1] - t.rays[0])
-            found = fill(t, 0, labels);
-        else
-            found = found && in_air == 0 && look_up_tile(simd, f, t, labels);
-        one_by_one_[static_cast<std::size_t>(t.points.row / kRows * across_ +
-                                             t.points.column / kColumns)] = !found;
-        if (!found) any_in_row_[static_cast<std::size_t>(t.points.row / kRows)] = true;
+        Step step = Step::one_by_one;
+        if (in_air > t.rays[1] - t.rays[0]) {
+            fill(t, 0, labels);
+            step = Step::done;
+        } else if (in_air == 0 && (f.press == nullptr || !bends(*f.press, t))) {
+            step = place(simd, f, t, labels, slots[next]);
+        }
+        if (step == Step::one_by_one) mark_one_by_one(t);
+        if (step != Step::waits) continue;
+        go_on(&slots[next]);
+        next = (next + 1) % 3;
     }
+    go_on(nullptr);
+    go_on(nullptr);
 }
 
-bool TruthTiles::fill(const Tile& t, int label, std::span<std::uint8_t> labels) const {
+void TruthTiles::mark_one_by_one(const Tile& t) {
+    one_by_one_[static_cast<std::size_t>(t.points.row / kRows * across_ +
+                                         t.points.column / kColumns)] = true;
+    any_in_row_[static_cast<std::size_t>(t.points.row / kRows)] = true;
+}
+
+void TruthTiles::fill(const Tile& t, int label, std::span<std::uint8_t> labels) const {
     for (int row = 0; row < t.rows; ++row)
         std::fill_n(first_label(t, labels) + static_cast<std::ptrdiff_t>(row) * width_px_,
                     columns(t), static_cast<std::uint8_t>(label));
-    return true;
 }
 
 // True where what moves a tile has bends that its points may miss.
@@ -201,32 +229,47 @@ bool TruthTiles::bends(const press::PressView& v, const Tile& t) const {
                                  kDentReachMm + half_mm_;
 }
 
-bool TruthTiles::look_up_tile(SimdTarget simd,
-                              const TruthFrameRows& f,
-                              const Tile& t,
-                              std::span<std::uint8_t> labels) const {
+TruthTiles::Step TruthTiles::place(SimdTarget simd,
+                                   const TruthFrameRows& f,
+                                   const Tile& t,
+                                   std::span<std::uint8_t> labels,
+                                   Waiting& out) const {
     constexpr float kSlackVx = 0.01f;  // more than places lose in single precision
-    TilePlaces places;
-    if (!truth_places(simd, f, t.points, places)) return false;
-    // The bricks that the places lie in.
-    int from[3], to[3];
-    bool inside = true, outside = false, in_region = f.region != nullptr;
+    if (!truth_places(simd, f, t.points, out.places)) return Step::one_by_one;
+    out.tile = &t;
+    out.inside = true;
+    bool outside = false, in_region = f.region != nullptr;
     for (int a = 0; a < 3; ++a) {
-        const float low = places.lower[a] - kSlackVx, high = places.upper[a] + kSlackVx;
+        const float low = out.places.lower[a] - kSlackVx, high = out.places.upper[a] + kSlackVx;
         const auto last = static_cast<float>(f.size[a] - 1);
-        inside = inside && low > -0.5f && high < last + 0.5f;
+        out.inside = out.inside && low > -0.5f && high < last + 0.5f;
         outside = outside || high < -0.5f || low > last + 0.5f;
         in_region = in_region && high >= f.region_lower[a] && low < f.region_upper[a];
-        from[a] = static_cast<int>(std::clamp(low, 0.0f, last) + 0.5f) >> 2;
-        to[a] = static_cast<int>(std::clamp(high, 0.0f, last) + 0.5f) >> 2;
+        out.from[a] = static_cast<int>(std::clamp(low, 0.0f, last) + 0.5f) >> 2;
+        out.to[a] = static_cast<int>(std::clamp(high, 0.0f, last) + 0.5f) >> 2;
     }
-    if (outside) return fill(t, 0, labels);
-    if (in_region) return false;
-    const int label = label_of_bricks(f, from, to);
-    if (label >= 0 && (inside || label == 0) && (!f.closes || f.closed_label[label] == label))
-        return fill(t, label, labels);
-    return truth_tile(simd, f, places, inside, t.rows, columns(t), first_label(t, labels),
-                      width_px_);
+    if (outside) {
+        fill(t, 0, labels);
+        return Step::done;
+    }
+    if (in_region) return Step::one_by_one;
+    for (int k = out.from[2]; k <= out.to[2]; ++k)
+        for (int j = out.from[1]; j <= out.to[1]; ++j)
+            hwy::Prefetch(f.bricks + k * f.bricks_xy + j * f.bricks_x + out.from[0]);
+    return Step::waits;
+}
+
+bool TruthTiles::find(SimdTarget simd,
+                      const TruthFrameRows& f,
+                      std::span<std::uint8_t> labels,
+                      Waiting& w) const {
+    const int label = label_of_bricks(f, w.from, w.to);
+    if (label >= 0 && (w.inside || label == 0) && (!f.closes || f.closed_label[label] == label)) {
+        fill(*w.tile, label, labels);
+        return false;
+    }
+    truth_voxels(simd, f, w.places, w.inside, w.tile->rows, w.voxels);
+    return true;
 }
 
 // The label of all bricks of a box, where that is one without surfaces; -1 otherwise.

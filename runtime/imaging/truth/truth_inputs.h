@@ -132,11 +132,26 @@ class TruthTiles {
         return labels.data() + static_cast<std::ptrdiff_t>(t.points.row) * width_px_ +
                t.points.column;
     }
-    bool fill(const Tile& tile, int label, std::span<std::uint8_t> labels) const;  // true
-    bool look_up_tile(SimdTarget simd,
-                      const TruthFrameRows& frame,
-                      const Tile& tile,
-                      std::span<std::uint8_t> labels) const;
+    // A tile on its way: its bricks, then its voxels are asked for while others are worked on.
+    struct Waiting {
+        const Tile* tile = nullptr;
+        TilePlaces places;
+        bool inside = true;  // all places lie in the volume
+        int from[3], to[3];  // bricks that the places lie in
+        TileVoxels voxels;
+    };
+    enum class Step { done, one_by_one, waits };
+    void fill(const Tile& tile, int label, std::span<std::uint8_t> labels) const;
+    Step place(SimdTarget simd,
+               const TruthFrameRows& frame,
+               const Tile& tile,
+               std::span<std::uint8_t> labels,
+               Waiting& out) const;
+    bool find(SimdTarget simd,  // false: its labels are there
+              const TruthFrameRows& frame,
+              std::span<std::uint8_t> labels,
+              Waiting& tile) const;
+    void mark_one_by_one(const Tile& tile);
     static int label_of_bricks(const TruthFrameRows& frame, const int from[3], const int to[3]);
 
     int width_px_ = 0, across_ = 0;

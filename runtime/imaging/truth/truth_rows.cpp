@@ -131,7 +131,7 @@ HWY_NOINLINE void press_back(
     };
     p = {moved(p.x, 0), moved(p.y, 1), moved(p.z, 2)};
     closed = hn::Zero(di);
-    if (f.press->pressed && f.press->field->closed_nodes().any)
+    if (f.press->pressed && f.press->field->closed_marks().any)
         closed = lanes::closed_lanes(d, *f.press, place, shift);
 }
 
@@ -555,16 +555,10 @@ bool places_of_tile(const TruthFrameRows& f, const TruthTile& tile, TilePlaces& 
 }
 
 template <bool kInside>
-bool labels_of_tile(const TruthFrameRows& f,
-                    const TilePlaces& places,
-                    int rows,
-                    int columns,
-                    std::uint8_t* labels,
-                    std::ptrdiff_t stride) {
-    constexpr int kColumns = TruthTile::kColumns, kPixels = kColumns * TruthTile::kRows;
+void voxels_of_tile(const TruthFrameRows& f, const TilePlaces& places, int rows, TileVoxels& out) {
+    constexpr int kColumns = TruthTile::kColumns;
     const TileD d;
     const hn::RebindToSigned<TileD> di;
-    const hn::Rebind<std::uint8_t, TileD> d8;
     const int lanes = static_cast<int>(hn::Lanes(d));
     // Places in the first row, and from row to row.
     HWY_ALIGN float first[3][kColumns], down[3][kColumns];
@@ -585,8 +579,6 @@ bool labels_of_tile(const TruthFrameRows& f,
                       d, down[a] + at);
         }
     }
-    HWY_ALIGN float x[kPixels], y[kPixels], z[kPixels];
-    HWY_ALIGN std::int32_t cell[kPixels], word[kPixels], boundary[kPixels];
     for (int row = 0, n = 0; row < rows; ++row) {
         const auto by = hn::Set(d, static_cast<float>(row));
         for (int at = 0; at < kColumns; at += lanes, n += lanes) {
@@ -596,21 +588,51 @@ bool labels_of_tile(const TruthFrameRows& f,
             const Voxels<TileD> voxels =
                 voxels_of<kInside>(d, f, Places<TileD>{place(0), place(1), place(2)});
             const Bricks<TileD> bricks = bricks_of(d, f, voxels.brick);
-            hn::Store(voxels.off.x, d, x + n);
-            hn::Store(voxels.off.y, d, y + n);
-            hn::Store(voxels.off.z, d, z + n);
-            hn::Store(voxels.cell, di, cell + n);
-            hn::Store(bricks.word, di, word + n);
-            hn::Store(bricks.boundary, di, boundary + n);
-            if (row % 2 == 0) ask_for_voxel(f, word[n], boundary[n], cell[n]);
+            hn::Store(voxels.off.x, d, out.x + n);
+            hn::Store(voxels.off.y, d, out.y + n);
+            hn::Store(voxels.off.z, d, out.z + n);
+            hn::Store(voxels.cell, di, out.cell + n);
+            hn::Store(bricks.word, di, out.word + n);
+            hn::Store(bricks.boundary, di, out.boundary + n);
         }
+        if (row % 2 == 0)
+            for (int at = n - kColumns; at < n; at += kAskEvery)
+                ask_for_voxel(f, out.word[at], out.boundary[at], out.cell[at]);
     }
+}
+
+void voxels_of_inner_tile(const TruthFrameRows& f,
+                          const TilePlaces& places,
+                          int rows,
+                          TileVoxels& out) {
+    voxels_of_tile<true>(f, places, rows, out);
+}
+void voxels_of_outer_tile(const TruthFrameRows& f,
+                          const TilePlaces& places,
+                          int rows,
+                          TileVoxels& out) {
+    voxels_of_tile<false>(f, places, rows, out);
+}
+
+bool labels_of_tile(const TruthFrameRows& f,
+                    const TileVoxels& voxels,
+                    int rows,
+                    int columns,
+                    std::uint8_t* labels,
+                    std::ptrdiff_t stride) {
+    constexpr int kColumns = TruthTile::kColumns;
+    const TileD d;
+    const hn::RebindToSigned<TileD> di;
+    const hn::Rebind<std::uint8_t, TileD> d8;
+    const int lanes = static_cast<int>(hn::Lanes(d));
     for (int row = 0, n = 0; row < rows; ++row, labels += stride) {
         for (int at = 0; at < kColumns; at += lanes, n += lanes) {
             const auto label = labels_of(
-                d, f, Bricks<TileD>{hn::Load(di, word + n), hn::Load(di, boundary + n)},
-                hn::Load(di, cell + n),
-                Places<TileD>{hn::Load(d, x + n), hn::Load(d, y + n), hn::Load(d, z + n)});
+                d, f,
+                Bricks<TileD>{hn::Load(di, voxels.word + n), hn::Load(di, voxels.boundary + n)},
+                hn::Load(di, voxels.cell + n),
+                Places<TileD>{hn::Load(d, voxels.x + n), hn::Load(d, voxels.y + n),
+                              hn::Load(d, voxels.z + n)});
             if (f.closes &&
                 !hn::AllTrue(di, hn::Eq(label, hn::GatherIndex(di, f.closed_label, label))))
                 return false;
@@ -625,23 +647,6 @@ bool labels_of_tile(const TruthFrameRows& f,
         }
     }
     return true;
-}
-
-bool labels_of_inner_tile(const TruthFrameRows& f,
-                          const TilePlaces& places,
-                          int rows,
-                          int columns,
-                          std::uint8_t* labels,
-                          std::ptrdiff_t stride) {
-    return labels_of_tile<true>(f, places, rows, columns, labels, stride);
-}
-bool labels_of_outer_tile(const TruthFrameRows& f,
-                          const TilePlaces& places,
-                          int rows,
-                          int columns,
-                          std::uint8_t* labels,
-                          std::ptrdiff_t stride) {
-    return labels_of_tile<false>(f, places, rows, columns, labels, stride);
 }
 
 void beams_of_run(const TruthFrameRows& frame, const TruthRun& of, const BeamPlanes& into) {
@@ -697,8 +702,9 @@ namespace sonocase::runtime {
 HWY_EXPORT(labels_of_run);
 HWY_EXPORT(rest_of_run);
 HWY_EXPORT(places_of_tile);
-HWY_EXPORT(labels_of_inner_tile);
-HWY_EXPORT(labels_of_outer_tile);
+HWY_EXPORT(voxels_of_inner_tile);
+HWY_EXPORT(voxels_of_outer_tile);
+HWY_EXPORT(labels_of_tile);
 HWY_EXPORT(beams_of_run);
 
 void truth_labels(SimdTarget simd,
@@ -726,18 +732,27 @@ bool truth_places(SimdTarget simd,
     return HWY_DISPATCH_TABLE(places_of_tile)[simd.index](frame, tile, places);
 }
 
+void truth_voxels(SimdTarget simd,
+                  const TruthFrameRows& frame,
+                  const TilePlaces& places,
+                  bool inside,
+                  int rows,
+                  TileVoxels& voxels) {
+    if (inside)
+        HWY_DISPATCH_TABLE(voxels_of_inner_tile)[simd.index](frame, places, rows, voxels);
+    else
+        HWY_DISPATCH_TABLE(voxels_of_outer_tile)[simd.index](frame, places, rows, voxels);
+}
+
 bool truth_tile(SimdTarget simd,
                 const TruthFrameRows& frame,
-                const TilePlaces& places,
-                bool inside,
+                const TileVoxels& voxels,
                 int rows,
                 int columns,
                 std::uint8_t* labels,
                 std::ptrdiff_t stride) {
-    return inside ? HWY_DISPATCH_TABLE(labels_of_inner_tile)[simd.index](frame, places, rows,
-                                                                         columns, labels, stride)
-                  : HWY_DISPATCH_TABLE(labels_of_outer_tile)[simd.index](frame, places, rows,
-                                                                         columns, labels, stride);
+    return HWY_DISPATCH_TABLE(labels_of_tile)[simd.index](frame, voxels, rows, columns, labels,
+                                                          stride);
 }
 
 void truth_beams(SimdTarget simd,

@@ -111,13 +111,28 @@ bool truth_places(SimdTarget simd,
                   const TruthTile& tile,
                   TilePlaces& places);
 
-// Writes the labels of a tile's pixels, scanned or not; a row of labels is `stride` long. inside:
-// all places lie in the volume. False where a lumen may be closed, which the pixels' own places
-// tell.
+// The voxels of a tile's pixels, row by row: where they lie in their bricks, what the table holds
+// for these, and the places relative to the voxels' centres.
+struct TileVoxels {
+    static constexpr int kPixels = TruthTile::kColumns * TruthTile::kRows;
+    alignas(64) float x[kPixels], y[kPixels], z[kPixels];
+    alignas(64) std::int32_t cell[kPixels], word[kPixels], boundary[kPixels];
+};
+
+// Finds the voxels, and asks for them: memory takes its time, so another tile is best worked on
+// before these are read. inside: all places lie in the volume.
+void truth_voxels(SimdTarget simd,
+                  const TruthFrameRows& frame,
+                  const TilePlaces& places,
+                  bool inside,
+                  int rows,
+                  TileVoxels& voxels);
+
+// Writes the labels of a tile's pixels, scanned or not; a row of labels is `stride` long. False
+// where a lumen may be closed, which the pixels' own places tell.
 bool truth_tile(SimdTarget simd,
                 const TruthFrameRows& frame,
-                const TilePlaces& places,
-                bool inside,
+                const TileVoxels& voxels,
                 int rows,
                 int columns,
                 std::uint8_t* labels,

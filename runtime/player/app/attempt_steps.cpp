@@ -234,9 +234,16 @@ bool toggle_attempt(PlayerState& player, CaseState& loaded, ScanState& scan) {
 
 namespace {
 
-// What is played begins with an empty list, whatever was done before it.
-void begin_procedure(CaseState& loaded) {
+// Plays a tracker that comes to an end. The list is empty before its first reading, which may act
+// already, whatever was done before it. False: it cannot be read; a notice says so.
+bool play(PlayerState& player, CaseState& loaded, ScanState& scan, const std::string& spec) {
+    scan.replay.tracker_before = scan.tracker.spec;
+    loaded.scan->set_tracker(nullptr);
     loaded.scan->with_engine([](ScanEngine& engine) { engine.begin_procedure(); });
+    choose_tracker(player, loaded, scan.tracker, spec);
+    if (scan.tracker.paced) return true;
+    choose_tracker(player, loaded, scan.tracker, std::exchange(scan.replay.tracker_before, {}));
+    return false;
 }
 
 }  // namespace
@@ -246,16 +253,10 @@ bool start_replay(PlayerState& player, CaseState& loaded, ScanState& scan) {
     if (training.attempt || !training.score || training.score_file.empty() || scan.replay.runs())
         return false;
     set_frozen(scan.console, false);
-    scan.replay.tracker_before = scan.tracker.spec;
-    choose_tracker(player, loaded, scan.tracker, "replay:" + training.score_file);
-    if (!scan.tracker.paced) {  // the recording could not be read; a notice says so
-        choose_tracker(player, loaded, scan.tracker, std::exchange(scan.replay.tracker_before, {}));
-        return false;
-    }
+    if (!play(player, loaded, scan, "replay:" + training.score_file)) return false;
     scan.replay.recorded = session_replay(scan.training.score_file);
     scan.replay.settings_before = scan.console.controls.settings;
     scan.replay.frame = 0;
-    begin_procedure(loaded);
     return true;
 }
 
@@ -264,14 +265,7 @@ bool watch_expert(PlayerState& player,
                   ScanState& scan,
                   const std::string& sweep) {
     if (scan.training.attempt || scan.replay.runs()) return false;
-    scan.replay.tracker_before = scan.tracker.spec;
-    choose_tracker(player, loaded, scan.tracker, "sweep:" + sweep);
-    if (scan.tracker.paced) {
-        begin_procedure(loaded);
-        return true;
-    }
-    choose_tracker(player, loaded, scan.tracker, std::exchange(scan.replay.tracker_before, {}));
-    return false;
+    return play(player, loaded, scan, "sweep:" + sweep);
 }
 
 void end_replay(PlayerState& player, CaseState& loaded, ScanState& scan) {
