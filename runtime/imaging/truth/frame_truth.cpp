@@ -306,6 +306,10 @@ void TruthRenderer::Impl::labels(const TruthPlanes& planes) {
         for (int n = 0; dark && n < run.count;) {
             const std::uint8_t label = to[n];
             const int begin = n;
+            for (std::uint64_t shown = 0; n + 8 <= run.count; n += 8) {
+                std::memcpy(&shown, to + n, 8);
+                if (shown != kEachByte * label) break;
+            }
             while (n < run.count && to[n] == label) ++n;
             if ((rows.labels[label] & kHard) != 0) darken(run, begin, n);
         }
