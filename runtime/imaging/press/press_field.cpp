@@ -29,21 +29,31 @@ void mark_closed(std::span<const PressTissue> tissues,
         const float *left = row + i / kMarks, part = static_cast<float>(i % kMarks) / kMarks;
         return i % kMarks == 0 ? *left : *left + part * (left[1] - *left);
     };
+    // Rows with a lumen, which are few; 0 beyond them.
+    std::array<float, kFineRows * kAcross> drains_at{};
+    for (int j = 0; j < kFineRows; ++j)
+        for (int i = 0; samples.lumen[j] && i < kAcross; ++i)
+            drains_at[j * kAcross + i] = at(samples.drains.row(j), i);
     const auto in_lumen = [&](int j, int i) {
-        return j < kFineRows && samples.lumen[j] && at(samples.drains.row(j), i) >= 0.5f;
+        return j < kFineRows && drains_at[j * kAcross + i] >= 0.5f;
     };
     std::array<bool, kFineRows * kAcross> shut{};
-    for (int i = 0; i < kAcross; ++i)
-        for (int first = 0, j = 0; j < kFineRows; ++j) {
-            if (!in_lumen(j, i)) continue;
+    std::array<bool, kFineRows> any_shut{};  // of a row
+    for (int first = 0; first < kFineRows; ++first) {
+        if (!samples.lumen[first]) continue;
+        for (int i = 0; i < kAcross; ++i) {
+            if (!in_lumen(first, i) || (first > 0 && in_lumen(first - 1, i))) continue;
             double height = 0, touching = 0;  // and the height at which walls touch
-            for (first = j; in_lumen(j, i); ++j) {
-                const float share = at(samples.drains.row(j), i);
-                height += fine_height(j) * double{at(columns.stretch.row(j), i)};
-                touching += fine_height(j) * (share * kShut + (1 - share));
+            int end = first;
+            for (; in_lumen(end, i); ++end) {
+                const float share = drains_at[end * kAcross + i];
+                height += fine_height(end) * double{at(columns.stretch.row(end), i)};
+                touching += fine_height(end) * (share * kShut + (1 - share));
             }
-            for (int n = first; height < touching && n < j; ++n) shut[n * kAcross + i] = true;
+            for (int n = first; height < touching && n < end; ++n)
+                shut[n * kAcross + i] = any_shut[n] = true;
         }
+    }
     // A round lumen reaches less far up and down beside its middle, and further across than the
     // parts that it fills to half: half a row around is searched, and half a column beside.
     constexpr int kAround = kParts / 2, kBeside = kMarks / 2;
@@ -66,11 +76,10 @@ void mark_closed(std::span<const PressTissue> tissues,
     };
     double rest = 0, open = 0;  // heights
     for (int j = 0; j < kFineRows; ++j) {
-        bool lumens = false;
+        bool around = false;
         for (int n = std::max(j - kAround, 0); n <= std::min(j + kAround, kFineRows - 1); ++n)
-            lumens = lumens || samples.lumen[n];
-        if (!lumens) continue;
-        for (int i = 0; i < kAcross; ++i) {
+            around = around || any_shut[n];
+        for (int i = 0; around && i < kAcross; ++i) {
             if (!near(j, i)) continue;
             out.part[j * kAcross + i] = true;
             out.any = true;
