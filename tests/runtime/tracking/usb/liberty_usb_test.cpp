@@ -32,7 +32,10 @@ class LibertyFirmware final : public Firmware {
     void on_tick(double now_s, DevicePort& port) override {
         while (clock_.due(now_s)) {
             if (!streaming_) continue;
-            if (static_cast<int>(frame_) == unplug_at_) return port.unplug();
+            if (static_cast<int>(frame_) == unplug_at_) {  // once all that was sent has arrived
+                if (port.host_waits()) port.unplug();
+                return;
+            }
             Bytes both;
             for (int station : {1, 2}) {
                 Bytes record = {'L', 'Y', static_cast<std::uint8_t>(station), 'C', ' ', 0, 40, 0};
@@ -90,7 +93,7 @@ TEST(LibertyOverUsb, ReportsADeviceThatWaitsForFirmware) {
 
 TEST(LibertyOverUsb, SurvivesBeingUnplugged) {
     const auto seen = run_liberty(0xFF20, 2, 0, 50);
-    expect_unplug_reported(seen, 10);  // merged where the machine is busy
+    expect_unplug_reported(seen, 40);
 }
 
 }  // namespace

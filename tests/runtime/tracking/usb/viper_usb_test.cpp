@@ -161,7 +161,7 @@ TEST(ViperOverUsb, StartsAndStreamsAt240Hz) {
     EXPECT_GE(seen["readings"].get<int>(), 480);
     EXPECT_EQ(seen["bad_frames"], 0);
     EXPECT_EQ(seen["connects"], 1);
-    EXPECT_GT(seen["rate_hz"].get<double>(), 20);  // 240 on a machine that is not busy
+    EXPECT_GT(seen["rate_hz"].get<double>(), 100);  // 240 on a machine that is not busy
     EXPECT_EQ(seen["device"], "Polhemus Viper (VIPER 4 SN 1234)");
     expect_poses(seen);
 }
@@ -211,7 +211,7 @@ TEST(ViperOverUsb, ReadsSplitAndMergedTransfers) {
     for (int merge : {1, 3}) {
         Trouble trouble;
         trouble.split = true;
-        trouble.hz = 30;  // of four transfers each: the emulation manages a thousand per second
+        trouble.hz = 60;  // of four transfers each: the emulation manages a thousand per second
         trouble.merge = merge;
         const auto seen = run_viper(trouble, 20, 40);
         EXPECT_GE(seen["readings"].get<int>(), 40);
